@@ -1,0 +1,46 @@
+#pragma once
+// Analytic shapes in model space: what a painting operation covers (§4: "drawing of points, lines, circles and other
+// primitives").
+
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/core/vector.h"
+
+namespace pointwright {
+
+/// All points within `radius` of `center`.
+struct Sphere {
+  Vec3d center = Vec3d::Zero();
+  double radius = 0.0;
+};
+/// A brush stroke: all points within `radius` of a polyline (one vertex: a sphere; two: a capsule).
+struct Stroke {
+  std::vector<Vec3d> vertices;  ///< at least 1
+  double radius = 0.0;
+};
+/// An axis-aligned box, borders included.
+struct AxisBox {
+  Vec3d min = Vec3d::Zero();
+  Vec3d max = Vec3d::Zero();
+};
+/// The side of a plane that its normal points to, the plane included: (x - point) . normal >= 0.
+struct HalfSpace {
+  Vec3d point = Vec3d::Zero();
+  Vec3d normal = Vec3d::UnitZ();
+};
+/// All of space.
+struct Everything {};
+
+using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything>;
+
+/// Finite members, radii > 0, min <= max, a normal that is not zero, at least one and at most 100,000 vertices.
+/// Errors: kInvalidArgument (field "shape.radius" and the like), kNonFinite.
+Result<void> validate(const Shape& shape);
+
+/// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for a stroke.
+bool contains(const Shape& shape, const Vec3d& point);
+
+}  // namespace pointwright
