@@ -1,0 +1,92 @@
+// kd-tree by nanoflann (Blanco, Rai: "nanoflann: a C++ header-only fork of FLANN", 2014).
+#include "engine/spatial/kd_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nanoflann.hpp>
+
+namespace pointwright {
+namespace {
+
+// Packed x y z: one cache line serves the three coordinates of a point that the tree looks at.
+struct PackedPoints {
+  std::vector<float> xyz;
+
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return xyz.size() / 3; }
+  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const { return xyz[3 * i + axis]; }
+  template <typename Box>
+  bool kdtree_get_bbox(Box& /*box*/) const {
+    return false;
+  }
+};
+
+using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PackedPoints>, PackedPoints, 3,
+                                                  std::uint32_t>;
+constexpr std::size_t kLeafSize = 12;
+
+}  // namespace
+
+struct KdTree::Tree {
+  Tree(const Points& points, std::vector<std::uint32_t> chosen) : subset(std::move(chosen)) {
+    const std::size_t n = subset.empty() ? points.size() : subset.size();
+    packed.xyz.resize(3 * n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t from = subset.empty() ? i : subset[i];
+      packed.xyz[3 * i] = points.x()[from];
+      packed.xyz[3 * i + 1] = points.y()[from];
+      packed.xyz[3 * i + 2] = points.z()[from];
+    }
+    if (n > 0) index = std::make_unique<Index>(3, packed, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize));
+  }
+  [[nodiscard]] std::uint32_t original(std::uint32_t i) const { return subset.empty() ? i : subset[i]; }
+
+  PackedPoints packed;
+  std::vector<std::uint32_t> subset;  // empty: all points
+  std::unique_ptr<Index> index;
+};
+
+KdTree::KdTree(const Points& points) : tree_(std::make_unique<Tree>(points, std::vector<std::uint32_t>{})) {}
+KdTree::KdTree(const Points& points, std::vector<std::uint32_t> subset)
+    : tree_(std::make_unique<Tree>(points, std::move(subset))) {}
+KdTree::~KdTree() = default;
+KdTree::KdTree(KdTree&&) noexcept = default;
+KdTree& KdTree::operator=(KdTree&&) noexcept = default;
+
+std::size_t KdTree::size() const { return tree_->packed.kdtree_get_point_count(); }
+
+void KdTree::nearest(const Vec3f& query, std::size_t k, std::vector<Neighbor>& found) const {
+  k = std::min(k, size());
+  found.clear();
+  if (k == 0) return;
+  constexpr std::size_t kStack = 64;
+  std::uint32_t stack_index[kStack];
+  float stack_distance[kStack];
+  std::vector<std::uint32_t> heap_index(k > kStack ? k : 0);
+  std::vector<float> heap_distance(k > kStack ? k : 0);
+  std::uint32_t* index = k > kStack ? heap_index.data() : stack_index;
+  float* distance = k > kStack ? heap_distance.data() : stack_distance;
+  nanoflann::KNNResultSet<float, std::uint32_t> result(k);
+  result.init(index, distance);
+  tree_->index->findNeighbors(result, query.data(), nanoflann::SearchParams());
+  found.reserve(result.size());
+  for (std::size_t i = 0; i < result.size(); ++i) found.push_back({tree_->original(index[i]), distance[i]});
+  std::sort(found.begin(), found.end());
+}
+
+bool KdTree::within(const Vec3f& query, float radius, std::size_t limit, std::vector<Neighbor>& found) const {
+  found.clear();
+  if (size() == 0 || !(radius >= 0.0F)) return false;
+  std::vector<std::pair<std::uint32_t, float>> hits;
+  // nanoflann leaves out points exactly on the border; the next float includes them.
+  const float radius_sq = std::nextafter(radius * radius, std::numeric_limits<float>::max());
+  tree_->index->radiusSearch(query.data(), radius_sq, hits, nanoflann::SearchParams(32, 0.0F, false));
+  found.reserve(hits.size());
+  for (const auto& [index, distance_sq] : hits) found.push_back({tree_->original(index), distance_sq});
+  std::sort(found.begin(), found.end());
+  const bool cut = found.size() > limit;
+  if (cut) found.resize(limit);
+  return cut;
+}
+
+}  // namespace pointwright
