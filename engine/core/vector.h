@@ -1,7 +1,7 @@
 #pragma once
 // The vector and matrix types of the whole engine: plain Eigen, by the names that the code reads best with.
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <limits>
 
 namespace pointwright {

@@ -1,0 +1,230 @@
+#include "engine/multires/base_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "engine/core/parallel.h"
+#include "engine/normals/plane_fit.h"
+#include "engine/smoothing/umbrella.h"
+#include "engine/spatial/coherent_order.h"
+
+namespace pointwright {
+namespace {
+
+constexpr double kCellOfScale = 0.7;
+constexpr std::uint32_t kSmoothingNeighbors = 10;
+
+// Samples sorted by grid cell: `order` lists them, cell c holds order[first[c] .. first[c + 1]).
+struct Grid {
+  std::vector<std::uint32_t> order;
+  std::vector<std::uint32_t> first;
+};
+
+Grid sort_into_cells(const Points& position, const Vec3d& origin, double cell) {
+  const std::size_t n = position.size();
+  const Box3f box = bounds_of(position);
+  const auto cell_of = [&](const Vec3f& p) -> Eigen::Array3d {
+    return ((origin + p.cast<double>()) / cell).array().floor();
+  };
+  const Eigen::Array3d lowest = cell_of(box.min);
+  Grid grid;
+  grid.order.resize(n);
+  std::iota(grid.order.begin(), grid.order.end(), 0U);
+  std::vector<std::uint64_t> keys(n);
+  parallel_for(n, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Array3d c = cell_of(position[i]) - lowest;
+      keys[i] = static_cast<std::uint64_t>(c.x()) | (static_cast<std::uint64_t>(c.y()) << 21) |
+                (static_cast<std::uint64_t>(c.z()) << 42);
+    }
+  });
+  sort_by_key(keys, grid.order);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (i == 0 || keys[i] != keys[i - 1]) grid.first.push_back(static_cast<std::uint32_t>(i));
+  }
+  grid.first.push_back(static_cast<std::uint32_t>(n));
+  return grid;
+}
+
+// What a cell contributes: one centroid, or two where opposite sheets share it.
+struct CellSplit {
+  std::array<Vec3d, 2> position;
+  std::array<Vec3d, 2> normal;
+  int parts = 1;
+  Vec3d axis = Vec3d::Zero();  // a sample belongs to part 0 where normal . axis >= 0
+};
+
+CellSplit split_cell(const Points& position, const Points& normal, const std::uint32_t* begin, const std::uint32_t* end) {
+  CellSplit split;
+  Mat3d spread = Mat3d::Zero();
+  for (const std::uint32_t* i = begin; i != end; ++i) {
+    const Vec3d n = normal[*i].cast<double>();
+    spread += n * n.transpose();
+  }
+  // The dominant direction of the normals, whatever their sides and their order.
+  Mat3d power = spread / spread.trace();
+  for (int squaring = 0; squaring < 6; ++squaring) {
+    power = (power * power).eval();
+    power /= power.trace();
+  }
+  Eigen::Index column = 0;
+  power.diagonal().maxCoeff(&column);
+  split.axis = power.col(column).normalized();
+
+  std::array<double, 2> count{};
+  split.position.fill(Vec3d::Zero());
+  split.normal.fill(Vec3d::Zero());
+  for (const std::uint32_t* i = begin; i != end; ++i) {
+    const Vec3d n = normal[*i].cast<double>();
+    const std::size_t part = n.dot(split.axis) >= 0.0 ? 0 : 1;
+    count[part] += 1.0;
+    split.position[part] += position[*i].cast<double>();
+    split.normal[part] += n;
+  }
+  if (count[0] > 0.0 && count[1] > 0.0 && split.normal[0].dot(split.normal[1]) < 0.0) {
+    split.parts = 2;
+  } else {
+    split.axis.setZero();
+    split.position[0] += split.position[1];
+    split.normal[0] += split.normal[1];
+    count[0] += count[1];
+  }
+  for (std::size_t part = 0; part < static_cast<std::size_t>(split.parts); ++part) {
+    split.position[part] /= count[part];
+    const double length = split.normal[part].norm();
+    split.normal[part] = length > 1e-6 ? Vec3d(split.normal[part] / length) : normal[*begin].cast<double>();
+  }
+  return split;
+}
+
+// Fills position, normal and counterpart of Q from the cells.
+void gather_cells(const Points& position, const Points& normal, const Grid& grid, BaseSurface& base) {
+  const std::size_t cells = grid.first.size() - 1;
+  std::vector<CellSplit> splits(cells);
+  parallel_for(
+      cells,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t c = begin; c < end; ++c) {
+          splits[c] = split_cell(position, normal, grid.order.data() + grid.first[c],
+                                 grid.order.data() + grid.first[c + 1]);
+        }
+      },
+      256);
+  std::vector<std::uint32_t> slot(cells + 1, 0);
+  for (std::size_t c = 0; c < cells; ++c) slot[c + 1] = slot[c] + static_cast<std::uint32_t>(splits[c].parts);
+  Points unordered(slot[cells]);
+  Points unordered_normal(slot[cells]);
+  base.counterpart.resize(position.size());
+  parallel_for(
+      cells,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t c = begin; c < end; ++c) {
+          for (std::uint32_t part = 0; part < static_cast<std::uint32_t>(splits[c].parts); ++part) {
+            unordered.set(slot[c] + part, splits[c].position[part].cast<float>());
+            unordered_normal.set(slot[c] + part, splits[c].normal[part].cast<float>());
+          }
+          for (std::uint32_t at = grid.first[c]; at < grid.first[c + 1]; ++at) {
+            const std::uint32_t i = grid.order[at];
+            const bool second = splits[c].parts == 2 && normal[i].cast<double>().dot(splits[c].axis) < 0.0;
+            base.counterpart[i] = slot[c] + (second ? 1U : 0U);
+          }
+        }
+      },
+      256);
+  // Coherent order inside Q, as everywhere.
+  const std::vector<std::uint32_t> order = coherent_order(unordered);
+  std::vector<std::uint32_t> rank(order.size());
+  base.position.resize(order.size());
+  base.normal.resize(order.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) {
+    rank[order[i]] = i;
+    base.position.set(i, unordered[order[i]]);
+    base.normal.set(i, unordered_normal[order[i]]);
+  }
+  for (std::uint32_t& q : base.counterpart) q = rank[q];
+}
+
+// The first kSmoothingNeighbors neighbours on the same side, repeated in turn where there are fewer: smoothing must
+// not pull opposite sheets together.
+NeighborGraph same_side_graph(const BaseSurface& base) {
+  NeighborGraph graph;
+  graph.count = base.graph.count;
+  graph.k = std::min(kSmoothingNeighbors, base.graph.k);
+  graph.lanes.assign(padded_to_block(graph.count) * graph.k, 0U);
+  parallel_for(graph.count, [&](std::size_t begin, std::size_t end) {
+    for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
+      std::array<std::uint32_t, kSmoothingNeighbors> same{};
+      std::uint32_t count = 0;
+      for (std::uint32_t j = 0; j < base.graph.k && count < graph.k; ++j) {
+        const std::uint32_t q = base.graph.index(i, j);
+        if (base.normal[i].dot(base.normal[q]) > 0.0F) same[count++] = q;
+      }
+      for (std::uint32_t j = 0; j < graph.k; ++j) graph.index(i, j) = count > 0 ? same[j % count] : i;
+    }
+  });
+  return graph;
+}
+
+// Normals of the smoothed Q by plane fits over its same-side neighbours, on the side of the old normals.
+void refit_normals(const Points& position, const NeighborGraph& graph, Points& normal) {
+  Points fitted(position.size());
+  parallel_for(position.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      PlaneFit fit;
+      fit.add(Vec3d::Zero(), 1.0);
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        fit.add((position[graph.index(i, j)] - position[i]).cast<double>(), 1.0);
+      }
+      Vec3d n;
+      const Vec3d before = normal[i].cast<double>();
+      if (!fit.normal(n)) n = before;
+      fitted.set(i, (n.dot(before) < 0.0 ? Vec3d(-n) : n).cast<float>());
+    }
+  });
+  normal = std::move(fitted);
+}
+
+float median_radius(const Points& position, const NeighborGraph& graph, std::uint32_t k) {
+  k = std::min(k, graph.k);
+  if (k == 0) return 0.0F;
+  std::vector<float> radius(position.size());
+  for (std::size_t i = 0; i < position.size(); ++i) radius[i] = (position[graph.index(i, k - 1)] - position[i]).norm();
+  const auto middle = radius.begin() + static_cast<std::ptrdiff_t>(radius.size() / 2);
+  std::nth_element(radius.begin(), middle, radius.end());
+  return *middle;
+}
+
+}  // namespace
+
+Result<BaseSurface> build_base_surface(const Points& position, const Points& normal, const Vec3d& origin, float scale,
+                                       const ExecutionContext& context) {
+  POINTWRIGHT_CHECK(scale > 0.0F, "a base needs a scale");
+  const double cell = kCellOfScale * static_cast<double>(scale);
+  BaseSurface base;
+  base.scale = scale;
+  gather_cells(position, normal, sort_into_cells(position, origin, cell), base);
+  base.graph = build_neighbor_graph(base.position, kCachedNeighbors, &context);
+  if (context.is_cancelled()) return cancelled_error();
+
+  // Variances add: a cell's uniform density has cell^2 / 12 an axis, the compact weights (1 - d^2/r^2)^4 of the
+  // least-squares planes r^2 / 12; the umbrella supplies the rest of scale^2.
+  const double radius = static_cast<double>(median_radius(base.position, base.graph, kPlaneNeighbors));
+  const double rest = static_cast<double>(scale) * static_cast<double>(scale) - (cell * cell + radius * radius) / 12.0;
+  const NeighborGraph smoothing_graph = same_side_graph(base);
+  if (rest > 0.0 && smoothing_graph.k > 0 && base.position.size() > 2 * kSmoothingNeighbors) {
+    auto smoothed = smooth_to_scale(base.position, base.normal, smoothing_graph, static_cast<float>(std::sqrt(rest)),
+                                    SmoothingDirection::kAlongNormal, &context);
+    if (!smoothed) return smoothed.error();
+    base.iterations = smoothed.value().iterations;
+    base.position = std::move(smoothed).value().points;
+    base.graph = build_neighbor_graph(base.position, kCachedNeighbors, &context);
+    if (context.is_cancelled()) return cancelled_error();
+  }
+  refit_normals(base.position, same_side_graph(base), base.normal);
+  return base;
+}
+
+}  // namespace pointwright

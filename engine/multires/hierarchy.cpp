@@ -1,0 +1,129 @@
+#include "engine/multires/hierarchy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/core/parallel.h"
+#include "engine/multires/base_surface.h"
+#include "engine/multires/decomposition.h"
+#include "engine/normals/estimation.h"
+#include "engine/normals/orientation.h"
+
+namespace pointwright {
+namespace {
+
+// Uploaded normals, made unit; estimated ones where an uploaded one is no direction.
+Points adopt_normals(const Points& uploaded, const Points& estimated) {
+  Points result(uploaded.size());
+  parallel_for(uploaded.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3f n = uploaded[i];
+      const float length = n.norm();
+      const bool usable = std::isfinite(length) && length > 1e-6F;
+      const bool is_unit = std::abs(length - 1.0F) < 1e-5F;  // keeps the bits of what is unit already
+      result.set(i, !usable ? estimated[i] : is_unit ? n : Vec3f(n / length));
+    }
+  });
+  return result;
+}
+
+float median(std::vector<float> values) {
+  if (values.empty()) return 0.0F;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// One band: fills `below` with the base level of `above` and returns its detail coefficients.
+Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origin, float scale, float spacing,
+                                          const ExecutionContext& context, Level& below, DecompositionReport& report) {
+  report.scale = scale;
+  if (!(scale > 0.0F)) {  // all samples coincide: the surface is its own base
+    below = above;
+    report.base_samples = above.position.size();
+    return std::vector<float>(above.position.size(), 0.0F);
+  }
+  auto base = build_base_surface(above.position, above.normal, origin, scale, context);
+  if (!base) return base.error();
+  report.base_samples = base.value().position.size();
+  auto parts = decompose(above.position, above.normal, base.value(), spacing, DecomposeParams{}, context);
+  if (!parts) return parts.error();
+  Decomposition& found = parts.value();
+  report.at_limit = found.at_limit;
+  report.fallback = found.fallback;
+  report.flipped = found.flipped;
+  report.mean_iterations = found.mean_iterations;
+  double squares = 0.0;
+  for (const float d : found.detail) {
+    report.max_detail = std::max(report.max_detail, std::abs(d));
+    squares += static_cast<double>(d) * static_cast<double>(d);
+  }
+  report.rms_detail = static_cast<float>(std::sqrt(squares / static_cast<double>(found.detail.size())));
+  below.position = std::move(found.base);
+  below.normal = std::move(found.normal);
+  return std::move(found.detail);
+}
+
+}  // namespace
+
+Result<void> validate(const HierarchyParams& params) {
+  if (params.scales.size() != 1) {
+    return Error{.code = ErrorCode::kInvalidArgument, .message = "exactly one band is supported", .field = "scales",
+                 .limit = 1, .actual = static_cast<double>(params.scales.size())};
+  }
+  for (const float scale : params.scales) {
+    if (!(scale >= 1e-4F && scale <= 0.2F)) {
+      return Error{.code = ErrorCode::kInvalidArgument,
+                   .message = "a scale is a fraction of the bounding-box diagonal between 0.0001 and 0.2",
+                   .field = "scales", .limit = 0.2, .actual = static_cast<double>(scale)};
+    }
+  }
+  if (params.neighbors < 4 || params.neighbors > 32) {
+    return Error{.code = ErrorCode::kInvalidArgument, .message = "neighbors must lie between 4 and 32",
+                 .field = "neighbors", .limit = 32, .actual = static_cast<double>(params.neighbors)};
+  }
+  return {};
+}
+
+Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& params, const ExecutionContext& context) {
+  if (const auto valid = validate(params); !valid) return valid.error();
+  if (cloud.size() == 0) {
+    return Error{.code = ErrorCode::kEmptyCloud, .message = "the cloud has no samples", .field = "cloud"};
+  }
+  Hierarchy result;
+  const std::size_t bands = params.scales.size();
+  result.surface.levels.resize(bands + 1);
+  result.surface.detail.resize(bands);
+  result.reports.resize(bands);
+  Level& finest = result.surface.levels.back();
+  finest.position = cloud.position;
+
+  context.begin_phase("neighbours", 0.0);
+  result.graph = build_neighbor_graph(cloud.position, params.neighbors, &context);
+  if (context.is_cancelled()) return cancelled_error();
+  result.spacing = local_spacing(cloud.position, result.graph);
+
+  context.begin_phase("normals", 0.35);
+  estimate_normals(cloud.position, result.graph, NormalParams{}, finest.normal);
+  if (cloud.has_normals()) {
+    finest.normal = adopt_normals(cloud.normal, finest.normal);
+  } else {
+    result.component_count = orient_normals(cloud.position, result.graph, finest.normal).components;
+  }
+  if (context.is_cancelled()) return cancelled_error();
+
+  const float diagonal = bounds_of(cloud.position).diagonal();
+  const float spacing = median(result.spacing);
+  for (std::size_t band = bands; band-- > 0;) {
+    context.begin_phase("decomposition", 0.55 + 0.45 * static_cast<double>(bands - 1 - band) / static_cast<double>(bands));
+    auto detail = decompose_band(result.surface.levels[band + 1], cloud.origin, params.scales[band] * diagonal, spacing,
+                                 context, result.surface.levels[band], result.reports[band]);
+    if (!detail) return detail.error();
+    result.surface.detail[band] = std::move(detail).value();
+  }
+  context.begin_phase("ready", 1.0);
+  return result;
+}
+
+}  // namespace pointwright
