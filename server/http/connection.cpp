@@ -1,0 +1,149 @@
+#include "server/http/connection.h"
+
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <thread>
+
+namespace pointwright::server {
+namespace {
+
+constexpr std::size_t kLingerDropBytes = 256 * 1024;
+constexpr std::size_t kReadBytes = 64 * 1024;
+
+int poll_timeout(Clock::time_point deadline) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+  return static_cast<int>(std::clamp<long long>(left, 0, 60'000));
+}
+
+/// Waits for events; false at the deadline.
+bool wait_for(int descriptor, short events, Clock::time_point deadline) {
+  while (true) {
+    pollfd entry{.fd = descriptor, .events = events, .revents = 0};
+    const int ready = ::poll(&entry, 1, poll_timeout(deadline));
+    if (ready > 0) return true;
+    if (ready < 0 && errno != EINTR) return true;  // let the call itself report what is wrong
+    if (Clock::now() >= deadline) return false;
+  }
+}
+
+}  // namespace
+
+Connection::Connection(int descriptor) : descriptor_(descriptor) {
+  // The library accepts without these: children must not inherit the socket, small answers must not wait.
+  ::fcntl(descriptor_, F_SETFD, FD_CLOEXEC);
+  ::fcntl(descriptor_, F_SETFL, ::fcntl(descriptor_, F_GETFL) | O_NONBLOCK);
+  const int on = 1;
+  ::setsockopt(descriptor_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+}
+
+Connection::~Connection() {
+  ::close(descriptor_);
+}
+
+std::ptrdiff_t Connection::receive(char* data, std::size_t size, Clock::time_point deadline) {
+  while (true) {
+    const ssize_t count = ::recv(descriptor_, data, size, 0);
+    if (count > 0) return count;
+    if (count == 0) return 0;
+    if (errno == EINTR) continue;
+    if (errno != EAGAIN && errno != EWOULDBLOCK) {
+      broken_ = true;
+      return 0;
+    }
+    if (!wait_for(descriptor_, POLLIN, deadline)) return -1;
+  }
+}
+
+Connection::HeadStatus Connection::read_head(std::size_t max_bytes, Clock::time_point deadline,
+                                             std::string& head) {
+  std::array<char, 4096> chunk;
+  std::size_t searched = 0;
+  while (true) {
+    const std::size_t end = head.find("\r\n\r\n", searched);
+    if (end != std::string::npos && end + 4 <= max_bytes) {
+      pending_ = head.substr(end + 4);
+      head.resize(end + 4);
+      return HeadStatus::kComplete;
+    }
+    if (head.size() >= max_bytes) return HeadStatus::kTooLarge;
+    searched = head.size() < 3 ? 0 : head.size() - 3;
+    // An absolute deadline: a byte now and then does not extend it.
+    if (Clock::now() >= deadline) return HeadStatus::kTimedOut;
+    const std::ptrdiff_t count = receive(chunk.data(), chunk.size(), deadline);
+    if (count < 0) return HeadStatus::kTimedOut;
+    if (count == 0) return HeadStatus::kClosed;
+    head.append(chunk.data(), static_cast<std::size_t>(count));
+  }
+}
+
+Connection::BodyStatus Connection::read_body(std::uint64_t length, Clock::time_point deadline,
+                                             std::string& body) {
+  body = pending_.substr(0, static_cast<std::size_t>(std::min<std::uint64_t>(length, pending_.size())));
+  pending_.clear();
+  while (body.size() < length) {
+    if (Clock::now() >= deadline) return BodyStatus::kTimedOut;
+    const std::size_t before = body.size();
+    const auto left = static_cast<std::size_t>(length - before);
+    body.resize(before + std::min(left, kReadBytes));
+    const std::ptrdiff_t count = receive(body.data() + before, body.size() - before, deadline);
+    body.resize(before + static_cast<std::size_t>(std::max<std::ptrdiff_t>(count, 0)));
+    if (count < 0) return BodyStatus::kTimedOut;
+    if (count == 0) return BodyStatus::kClosed;
+  }
+  return BodyStatus::kComplete;
+}
+
+bool Connection::write_all(std::span<const std::byte> bytes, Clock::time_point deadline) {
+  while (!bytes.empty() && !broken_) {
+    const ssize_t count = ::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (count >= 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(count));
+      // A reader that takes a byte at a time must not push the deadline ahead of itself.
+      if (!bytes.empty() && Clock::now() >= deadline) broken_ = true;
+      continue;
+    }
+    if (errno == EINTR) continue;
+    if ((errno != EAGAIN && errno != EWOULDBLOCK) || !wait_for(descriptor_, POLLOUT, deadline))
+      broken_ = true;
+  }
+  return !broken_;
+}
+
+bool Connection::write_all(std::string_view text, Clock::time_point deadline) {
+  return write_all(std::as_bytes(std::span(text.data(), text.size())), deadline);
+}
+
+bool Connection::is_peer_gone() const {
+  if (broken_) return true;
+  pollfd entry{.fd = descriptor_, .events = POLLRDHUP, .revents = 0};
+  return ::poll(&entry, 1, 0) > 0 && (entry.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
+}
+
+void Connection::linger(std::chrono::milliseconds patience) {
+  if (broken_) return;
+  ::shutdown(descriptor_, SHUT_WR);
+  const Clock::time_point deadline = Clock::now() + patience;
+  std::array<char, 16 * 1024> chunk;
+  std::size_t dropped = 0;
+  while (Clock::now() < deadline) {
+    if (dropped >= kLingerDropBytes) {
+      // Enough was read; the peer still gets the time to read our answer before the reset.
+      if (is_peer_gone()) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      continue;
+    }
+    const std::ptrdiff_t count = receive(chunk.data(), chunk.size(), deadline);
+    if (count <= 0) return;
+    dropped += static_cast<std::size_t>(count);
+  }
+}
+
+}  // namespace pointwright::server

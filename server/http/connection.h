@@ -1,0 +1,54 @@
+#pragma once
+// One accepted socket with byte budgets and absolute deadlines. No HTTP library here.
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace pointwright::server {
+
+using Clock = std::chrono::steady_clock;
+
+/// Owns the descriptor; used by one thread at a time.
+class Connection {
+ public:
+  explicit Connection(int descriptor);
+  ~Connection();
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  enum class HeadStatus { kComplete, kClosed, kTimedOut, kTooLarge };
+  /// Reads up to and including the empty line that ends a head; bytes beyond it are kept for read_body.
+  /// Never holds more than max_bytes (+ one read) and never waits beyond the deadline.
+  HeadStatus read_head(std::size_t max_bytes, Clock::time_point deadline, std::string& head);
+
+  enum class BodyStatus { kComplete, kClosed, kTimedOut };
+  /// Reads exactly `length` bytes of body into `body` (reserved as it arrives, not as it is announced).
+  BodyStatus read_body(std::uint64_t length, Clock::time_point deadline, std::string& body);
+
+  /// Writes everything before the deadline. False: the peer is gone or too slow; the connection is then
+  /// broken.
+  bool write_all(std::span<const std::byte> bytes, Clock::time_point deadline);
+  bool write_all(std::string_view text, Clock::time_point deadline);
+
+  [[nodiscard]] bool is_broken() const { return broken_; }
+  /// Whether the peer has closed or reset its side. Never blocks.
+  [[nodiscard]] bool is_peer_gone() const;
+
+  /// Ends our side, then waits for the peer's end a little, dropping at most a bounded number of bytes: so
+  /// that an answer that was sent before the body was read is not lost to a reset.
+  void linger(std::chrono::milliseconds patience);
+
+ private:
+  /// recv within the deadline. > 0: bytes; 0: closed or broken; -1: timed out.
+  std::ptrdiff_t receive(char* data, std::size_t size, Clock::time_point deadline);
+
+  int descriptor_;
+  std::string pending_;  // read beyond the head, not yet handed out
+  bool broken_ = false;
+};
+
+}  // namespace pointwright::server

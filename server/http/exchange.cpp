@@ -1,0 +1,238 @@
+#include "server/http/exchange.h"
+
+#include <sys/random.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <stdexcept>
+
+#include "server/http/error_map.h"
+
+namespace pointwright::server {
+namespace {
+
+/// For pages of the viewer and for everything else: nothing is loaded from elsewhere, nothing may frame us.
+constexpr std::string_view kContentSecurityPolicy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src "
+    "'self'; "
+    "font-src 'self'; worker-src 'self' blob:; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'";
+
+bool is_well_formed_id(std::string_view id) {
+  return !id.empty() && id.size() <= 64 && std::all_of(id.begin(), id.end(), [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
+           c == '_' || c == '-';
+  });
+}
+
+bool has_header(const Response& response, std::string_view name) {
+  return std::any_of(response.headers.begin(), response.headers.end(),
+                     [&](const NameValue& h) { return h.first == name; });
+}
+
+std::string server_timing(const std::vector<std::pair<std::string, double>>& timings) {
+  std::string value;
+  for (const auto& [name, ms] : timings) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), ";dur=%.2f", ms);
+    if (!value.empty()) value += ", ";
+    value += name + text.data();
+  }
+  return value;
+}
+
+double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+std::chrono::milliseconds time_for(std::uint64_t bytes, std::uint64_t rate) {
+  return std::chrono::milliseconds(bytes / std::max<std::uint64_t>(rate / 1000, 1));
+}
+
+}  // namespace
+
+std::string random_id() {
+  std::array<unsigned char, 16> bits{};
+  std::size_t have = 0;
+  while (have < bits.size()) {
+    const ssize_t count = ::getrandom(bits.data() + have, bits.size() - have, 0);
+    if (count < 0 && errno != EINTR) throw std::runtime_error("the kernel gives no random numbers");
+    if (count > 0) have += static_cast<std::size_t>(count);
+  }
+  constexpr std::string_view kAlphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+  std::string id;
+  unsigned accumulator = 0;
+  int held = 0;
+  for (const unsigned char byte : bits) {
+    accumulator = (accumulator << 8U | byte) & 0xffffU;
+    held += 8;
+    while (held >= 6) {
+      held -= 6;
+      id.push_back(kAlphabet[accumulator >> static_cast<unsigned>(held) & 63U]);
+    }
+  }
+  id.push_back(kAlphabet[accumulator << static_cast<unsigned>(6 - held) & 63U]);
+  return id;
+}
+
+Exchange::Exchange(const ExchangeContext& context, Connection& connection, bool refuse)
+    : context_(context),
+      connection_(connection),
+      refuse_(refuse),
+      begin_(Clock::now()),
+      write_deadline_(begin_ + context.options.write_grace),
+      request_id_(random_id()) {}
+
+bool Exchange::read_head() {
+  std::string bytes;
+  const auto patience = refuse_ ? std::chrono::milliseconds(250) : context_.options.head_deadline;
+  const auto status = connection_.read_head(context_.options.head.max_bytes, begin_ + patience, bytes);
+  log_.request_bytes = bytes.size();
+  switch (status) {
+    case Connection::HeadStatus::kComplete:
+      head_ = parse_head(bytes, context_.options.head);
+      break;
+    case Connection::HeadStatus::kClosed:
+      return false;
+    case Connection::HeadStatus::kTimedOut:
+      // An idle connection that never asked is closed without a word, like a kept-alive one.
+      if (bytes.empty()) return false;
+      head_ = Problem{.kind = ProblemKind::kRequestTimeout, .detail = "the head did not arrive in time"};
+      break;
+    case Connection::HeadStatus::kTooLarge:
+      head_ = Problem{.kind = ProblemKind::kHeadTooLarge,
+                      .detail = "the head is larger than the server reads",
+                      .limit = static_cast<double>(context_.options.head.max_bytes)};
+      break;
+  }
+  if (const auto* head = std::get_if<RequestHead>(&head_)) {
+    if (const auto id = head->header("x-request-id"); id && is_well_formed_id(*id)) request_id_ = *id;
+    log_.method = method_name(head->method);
+    log_.path = head->path;
+  }
+  return true;
+}
+
+bool Exchange::is_head_request() const {
+  const auto* head = std::get_if<RequestHead>(&head_);
+  return head != nullptr && head->method == Method::kHead;
+}
+
+Response Exchange::refuse(const Problem& problem) {
+  const auto* head = std::get_if<RequestHead>(&head_);
+  return problem_response(problem, head != nullptr ? head->path : "", request_id_);
+}
+
+std::optional<Problem> Exchange::check_body(const BodyPolicy& policy) const {
+  const RequestHead& head = std::get<RequestHead>(head_);
+  const std::uint64_t length = head.content_length.value_or(0);
+  if (policy.kind == BodyPolicy::Kind::kNone) {
+    if (length == 0) return std::nullopt;
+    return Problem{.kind = ProblemKind::kBodyTooLarge,
+                   .detail = "this request takes no body",
+                   .limit = 0,
+                   .actual = static_cast<double>(length)};
+  }
+  const std::string type = head.media_type();
+  if (policy.kind == BodyPolicy::Kind::kJson && type != "application/json")
+    return Problem{.kind = ProblemKind::kUnsupportedMediaType, .detail = "send application/json"};
+  if (policy.kind == BodyPolicy::Kind::kCloud && type != "model/x-draco" && type != "application/x-ply" &&
+      type != "text/plain" && type != "application/octet-stream")
+    return Problem{
+        .kind = ProblemKind::kUnsupportedMediaType,
+        .detail = "send model/x-draco, application/x-ply, text/plain (XYZ) or application/octet-stream"};
+  if (length > policy.max_bytes)
+    return Problem{.kind = ProblemKind::kBodyTooLarge,
+                   .detail = "the body is larger than this route takes",
+                   .limit = static_cast<double>(policy.max_bytes),
+                   .actual = static_cast<double>(length)};
+  return std::nullopt;
+}
+
+std::optional<Problem> Exchange::read_body(const BodyPolicy& policy, std::string& body) {
+  if (policy.kind == BodyPolicy::Kind::kNone) return std::nullopt;
+  const RequestHead& head = std::get<RequestHead>(head_);
+  const std::uint64_t length = head.content_length.value_or(0);
+  const HttpOptions& options = context_.options;
+  if (head.header("expect") && length > 0)
+    connection_.write_all(std::string_view("HTTP/1.1 100 Continue\r\n\r\n"),
+                          Clock::now() + options.write_grace);
+  const auto deadline = Clock::now() + options.body_grace + time_for(length, options.least_body_rate);
+  const auto status = connection_.read_body(length, deadline, body);
+  log_.request_bytes += body.size();
+  if (status == Connection::BodyStatus::kComplete) return std::nullopt;
+  if (status == Connection::BodyStatus::kTimedOut)
+    return Problem{.kind = ProblemKind::kRequestTimeout, .detail = "the body came too slowly"};
+  return Problem{.kind = ProblemKind::kMalformedRequest,
+                 .detail = "the body ended before its Content-Length",
+                 .limit = std::nullopt,
+                 .actual = static_cast<double>(body.size())};
+}
+
+Response Exchange::dispatch() {
+  if (const auto* problem = std::get_if<Problem>(&head_)) return refuse(*problem);
+  if (refuse_)
+    return refuse({.kind = ProblemKind::kOverloaded,
+                   .detail = "all connections are in use",
+                   .limit = static_cast<double>(context_.options.max_connections)});
+  if (context_.stopping)
+    return refuse({.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"});
+  auto& head = std::get<RequestHead>(head_);
+  if (auto problem = check_origin(head, context_.options.allowed_hosts)) return refuse(*problem);
+  Resolution resolution = context_.resolver(head, request_id_);
+  if (auto* response = std::get_if<Response>(&resolution)) return std::move(*response);
+  auto& endpoint = std::get<Endpoint>(resolution);
+  log_.route = endpoint.route;
+  if (auto problem = check_body(endpoint.body)) return refuse(*problem);
+  Request request{.head = head, .id = request_id_, .captures = std::move(endpoint.captures), .body = {}};
+  if (auto problem = read_body(endpoint.body, request.body)) return refuse(*problem);
+  return endpoint.handle(request);
+}
+
+Response Exchange::answer() {
+  Response response;
+  try {
+    response = dispatch();
+  } catch (const std::bad_alloc&) {
+    note_failure("out of memory");
+    response = refuse(
+        {.kind = ProblemKind::kOutOfSpace, .detail = "the server has no memory left for this request"});
+  } catch (const std::exception& error) {
+    note_failure(error.what());
+    response = refuse({.kind = ProblemKind::kInternalError, .detail = "the server failed; its log says why"});
+  } catch (...) {
+    note_failure("an unknown exception");
+    response = refuse({.kind = ProblemKind::kInternalError, .detail = "the server failed; its log says why"});
+  }
+  log_.status = response.status;
+  response.timings.emplace_back("total", milliseconds_since(begin_));
+  response.with_header("X-Request-Id", request_id_)
+      .with_header("Server-Timing", server_timing(response.timings))
+      .with_header("Content-Security-Policy", std::string(kContentSecurityPolicy))
+      .with_header("X-Content-Type-Options", "nosniff")
+      .with_header("Referrer-Policy", "no-referrer")
+      .with_header("Cross-Origin-Resource-Policy", "same-origin")
+      .with_header("Cross-Origin-Opener-Policy", "same-origin")
+      .with_header("Accept-Ranges", "none");
+  if (!has_header(response, "Cache-Control")) response.with_header("Cache-Control", "no-store");
+  return response;
+}
+
+void Exchange::begin_answer(std::uint64_t bytes) {
+  const HttpOptions& options = context_.options;
+  write_deadline_ = Clock::now() + options.write_grace + time_for(bytes, options.least_write_rate);
+}
+
+void Exchange::begin_stream_write() {
+  write_deadline_ = Clock::now() + context_.options.stream_write_deadline;
+}
+
+void Exchange::finish() {
+  log_.request_id = request_id_;
+  log_.duration_ms = milliseconds_since(begin_);
+  if (context_.log) context_.log(log_);
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,102 @@
+#pragma once
+// Requests and responses as the rest of the server sees them. Nothing here knows the HTTP library.
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace pointwright::server {
+
+enum class Method { kGet, kHead, kPost, kPut, kPatch, kDelete, kOptions };
+
+std::string_view method_name(Method method);
+/// Whether the method asks for a change of state (and therefore owes a matching Origin).
+bool changes_state(Method method);
+
+using NameValue = std::pair<std::string, std::string>;
+
+/// The head of a request, strictly parsed: what is not plainly right never gets here.
+struct RequestHead {
+  Method method = Method::kGet;
+  std::string path;                ///< percent-decoded, without NUL or control characters
+  std::vector<NameValue> query;    ///< decoded, in order
+  std::vector<NameValue> headers;  ///< names in lower case, values trimmed; hostile bytes: never echo them
+  std::optional<std::uint64_t> content_length;
+
+  /// The value of a header (name in lower case); the first one where it is repeated.
+  [[nodiscard]] std::optional<std::string_view> header(std::string_view name) const;
+  /// The media type of the body in lower case, without its parameters; empty where none is given.
+  [[nodiscard]] std::string media_type() const;
+};
+
+struct Request {
+  RequestHead head;
+  std::string id;                     ///< X-Request-Id: the client's where it is well-formed, else a new one
+  std::vector<std::string> captures;  ///< what the placeholders of the route matched
+  std::string body;
+
+  [[nodiscard]] std::span<const std::byte> body_bytes() const {
+    return std::as_bytes(std::span(body.data(), body.size()));
+  }
+};
+
+/// Where a streamed body goes. write() blocks until the bytes are with the kernel, at most as long as the
+/// deadline that the fence gives a record; false means that the peer is gone or too slow, and the body must
+/// return.
+class BodySink {
+ public:
+  virtual ~BodySink() = default;
+  virtual bool write(std::span<const std::byte> bytes) = 0;
+  [[nodiscard]] virtual bool is_peer_gone() = 0;
+  /// Whether the server wants to stop: the body should write its closing record and return.
+  [[nodiscard]] virtual bool is_stopping() const = 0;
+};
+
+/// Bytes that several answers may share; `owner` keeps them alive.
+struct SharedBytes {
+  std::shared_ptr<const void> owner;
+  std::span<const std::byte> bytes;
+};
+/// Runs on the connection's thread until the body is complete.
+using StreamBody = std::function<void(BodySink&)>;
+
+struct Response {
+  int status = 200;
+  std::string content_type = {};
+  std::vector<NameValue> headers = {};
+  std::variant<std::monostate, std::string, SharedBytes, StreamBody> body = {};
+  /// Server-Timing entries: name and milliseconds.
+  std::vector<std::pair<std::string, double>> timings = {};
+
+  Response& with_header(std::string name, std::string value) {
+    headers.emplace_back(std::move(name), std::move(value));
+    return *this;
+  }
+};
+
+/// What the body of a route may be.
+struct BodyPolicy {
+  enum class Kind { kNone, kJson, kCloud };
+  Kind kind = Kind::kNone;
+  std::uint64_t max_bytes = 0;
+};
+
+/// The outcome of looking a request up: either its answer at once, or what handles it and which body it
+/// takes.
+struct Endpoint {
+  BodyPolicy body;
+  std::string route;  ///< the pattern, for logs
+  std::vector<std::string> captures;
+  std::function<Response(const Request&)> handle;
+};
+using Resolution = std::variant<Response, Endpoint>;
+
+}  // namespace pointwright::server
