@@ -1,0 +1,122 @@
+#pragma once
+// What the server sends: plain structs, and their JSON.
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/core/execution_context.h"
+#include "engine/io/cloud_io.h"
+#include "engine/multires/hierarchy.h"
+#include "protocol/json/problem.h"
+#include "protocol/json/requests.h"
+
+namespace pointwright::protocol {
+
+using TimePoint = std::chrono::system_clock::time_point;
+
+/// An axis-aligned box in model space.
+struct ModelBounds {
+  Vec3d min = Vec3d::Zero();
+  Vec3d max = Vec3d::Zero();
+};
+
+struct CloudDocument {
+  std::string id;
+  std::string name;
+  std::string sha256;       ///< of the uploaded bytes, 64 hexadecimal digits
+  std::uint64_t bytes = 0;  ///< of the upload
+  TimePoint created;
+  Vec3d origin = Vec3d::Zero();
+  ImportReport report;  ///< sample count and bounds are taken from it
+};
+
+enum class SessionState { kBuilding, kReady, kFailed };
+
+struct RegionSummary {
+  std::uint64_t samples = 0;
+  std::uint64_t operations = 0;
+};
+
+/// A session in a list.
+struct SessionSummary {
+  std::string id;
+  std::string name;
+  std::string cloud;
+  SessionState state = SessionState::kBuilding;
+  std::uint64_t revision = 0;
+  TimePoint created;
+  std::uint64_t sample_count = 0;
+};
+
+struct SessionDocument {
+  SessionSummary summary;
+  Progress progress;
+  std::optional<Problem> error = std::nullopt;  ///< kFailed: why
+  Vec3d origin = Vec3d::Zero();
+  ModelBounds bounds;
+  double spacing = 0.0;              ///< median, model units; 0 until the session is ready
+  std::vector<double> level_scales;  ///< of levels 0, 1, …, in model units; the finest has 0
+  std::vector<DecompositionReport> decomposition;
+  RegionSummary zero;
+  RegionSummary one;
+  std::uint32_t head = 0;   ///< edits that are applied
+  std::uint32_t edits = 0;  ///< edits in the history, those undone included
+  std::vector<std::pair<std::string, double>> timings_ms;
+};
+
+struct EditRecord {
+  std::uint32_t index = 0;  ///< 1 for the first edit: the head that shows it
+  EditParams edit;
+  TimePoint created;
+  std::uint64_t moved_samples = 0;
+  std::uint64_t zero_samples = 0;
+  std::uint64_t one_samples = 0;
+};
+
+struct InfoDocument {
+  std::string version;
+  std::vector<std::pair<std::string, std::uint64_t>> limits;  ///< every limit, by name
+  std::vector<std::string> formats;
+  std::vector<std::string> features;
+};
+
+std::string_view session_state_name(SessionState state);
+
+JsonDocument to_json(const ModelBounds& bounds);
+JsonDocument to_json(const ImportReport& report);
+JsonDocument to_json(const CloudDocument& cloud);
+JsonDocument to_json(const DecompositionReport& report);
+JsonDocument to_json(const SessionSummary& session);
+JsonDocument to_json(const SessionDocument& session);
+JsonDocument to_json(const EditRecord& record);
+JsonDocument to_json(const InfoDocument& info);
+JsonDocument cloud_list(const std::vector<CloudDocument>& clouds);
+JsonDocument session_list(const std::vector<SessionSummary>& sessions);
+/// {"region", "samples", "operations"}
+JsonDocument painting_document(RegionKind region, std::uint64_t samples,
+                               const std::vector<PaintOperation>& operations);
+/// {"head", "edits"}
+JsonDocument edit_list(std::uint32_t head, const std::vector<EditRecord>& edits);
+
+/// Events of a stream (FRAMES.md).
+JsonDocument session_event(const SessionDocument& session);
+JsonDocument progress_event(const Progress& progress);
+JsonDocument heartbeat_event();
+JsonDocument end_event(std::string_view reason);
+
+/// The text of a document: UTF-8 without line breaks; bytes that are not UTF-8 are replaced, never thrown at.
+std::string to_text(const JsonDocument& document);
+
+/// RFC 3339 in UTC with milliseconds: "2026-01-31T12:00:00.000Z".
+std::string to_rfc3339(TimePoint time);
+
+/// A number for a document. JSON has no NaN: a LogicError unless it is finite.
+double checked_number(double value);
+/// A float by its shortest decimal: 0.02F is 0.02, not 0.019999999552965164.
+double checked_number(float value);
+
+}  // namespace pointwright::protocol
