@@ -1,0 +1,31 @@
+// Canonical form: clang-format for C++, Biome (format and lint) for TypeScript and JavaScript, bash -n for shell scripts.
+import { resolve } from "node:path";
+import { contentOf, root, run, together, trackedFiles, verdict } from "../support/process.mjs";
+
+async function cpp() {
+  const paths = await trackedFiles(/\.(h|cpp)$/);
+  const { status, output } = await run("clang-format-14", ["--dry-run", "--Werror", ...paths]);
+  const files = new Set([...output.matchAll(/^(\S+?):\d+:\d+: error/gm)].map(([, path]) => path));
+  if (status !== 0 && files.size === 0) return verdict([output]);
+  return verdict([...files].map((path) => `${path} is not in clang-format's form`), "`make format` puts them right.");
+}
+
+async function web() {
+  const { status, output } = await run("node", ["node_modules/@biomejs/biome/bin/biome", "check", "--colors=off", "."], { cwd: resolve(root, "web") });
+  return verdict(status === 0 ? [] : [output.trim()], "`make format` puts most of it right.");
+}
+
+async function shell() {
+  const complaints = [];
+  for (const path of await trackedFiles(/^[^.]*$|\.sh$|^\.ci\/|^\.githooks\//)) {
+    if (!/^#!.*\b(bash|sh)\b/.test(contentOf(path))) continue;
+    const { status, output } = await run("bash", ["-n", path]);
+    if (status !== 0) complaints.push(`${path}: ${output.trim()}`);
+    if (!/^set -euo pipefail$/m.test(contentOf(path))) complaints.push(`${path} lacks 'set -euo pipefail'`);
+  }
+  return verdict(complaints);
+}
+
+export async function format() {
+  return together([await cpp(), await web(), await shell()]);
+}
