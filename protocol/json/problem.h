@@ -77,8 +77,8 @@ ProblemType problem_of(ErrorCode code);
 
 struct Problem {
   ProblemType type = ProblemType::kInternalError;
-  std::string detail;    ///< this occurrence, in one sentence, with values and limits
-  std::string instance;  ///< the path of the request
+  std::string detail;         ///< this occurrence, in one sentence, with values and limits
+  std::string instance = {};  ///< the path of the request
   std::string request_id = {};
   std::vector<JsonFault> errors = {};
   std::optional<double> limit = std::nullopt;
