@@ -19,7 +19,7 @@ class LogicError : public std::logic_error {
 }  // namespace pointwright
 
 // NOLINTNEXTLINE(cppcoreguidelines-macro-usage): the condition's text and place are worth a macro.
-#define POINTWRIGHT_CHECK(condition, message)                                              \
-  do {                                                                                     \
-    if (!(condition)) ::pointwright::fail_check(#condition, message, __FILE__, __LINE__);  \
+#define POINTWRIGHT_CHECK(condition, message)                                             \
+  do {                                                                                    \
+    if (!(condition)) ::pointwright::fail_check(#condition, message, __FILE__, __LINE__); \
   } while (false)

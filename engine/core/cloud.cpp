@@ -55,8 +55,9 @@ Cloud permuted(const Cloud& cloud, const std::vector<std::uint32_t>& order) {
   result.scalars.reserve(cloud.scalars.size());
   for (const ScalarAttribute& scalar : cloud.scalars) {
     result.scalars.push_back(
-        {scalar.name, std::visit([&](const auto& values) { return ScalarAttribute::Values(gather(values, order)); },
-                                 scalar.values)});
+        {scalar.name,
+         std::visit([&](const auto& values) { return ScalarAttribute::Values(gather(values, order)); },
+                    scalar.values)});
   }
   return result;
 }
@@ -64,7 +65,8 @@ Cloud permuted(const Cloud& cloud, const std::vector<std::uint32_t>& order) {
 Cloud in_caller_order(const Cloud& cloud) {
   std::vector<std::uint32_t> order(cloud.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return cloud.id[a] < cloud.id[b]; });
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return cloud.id[a] < cloud.id[b]; });
   return permuted(cloud, order);
 }
 
@@ -75,22 +77,26 @@ Result<void> validate(const Cloud& cloud) {
   if (wrong(cloud.color.size(), true)) return malformed("color", n, cloud.color.size());
   if (wrong(cloud.texcoord.size(), true)) return malformed("texcoord", n, cloud.texcoord.size());
   if (wrong(cloud.id.size(), false)) return malformed("id", n, cloud.id.size());
-  if (wrong(cloud.exact_position.size(), true)) return malformed("exact_position", n, cloud.exact_position.size());
+  if (wrong(cloud.exact_position.size(), true))
+    return malformed("exact_position", n, cloud.exact_position.size());
   for (const ScalarAttribute& scalar : cloud.scalars) {
     if (wrong(scalar.size(), false)) return malformed(scalar.name.c_str(), n, scalar.size());
   }
   std::vector<bool> seen(n, false);
   for (const std::uint32_t id : cloud.id) {
     if (id >= n || seen[id]) {
-      return Error{.code = ErrorCode::kMalformedData, .message = "the sample ids are not a permutation", .field = "id"};
+      return Error{.code = ErrorCode::kMalformedData,
+                   .message = "the sample ids are not a permutation",
+                   .field = "id"};
     }
     seen[id] = true;
   }
   for (std::size_t i = 0; i < n; ++i) {
     if (!cloud.position[i].allFinite()) {
-      return Error{.code = ErrorCode::kNonFinite,
-                   .message = "sample " + std::to_string(cloud.id[i]) + " has a coordinate that is not finite",
-                   .field = "position"};
+      return Error{
+          .code = ErrorCode::kNonFinite,
+          .message = "sample " + std::to_string(cloud.id[i]) + " has a coordinate that is not finite",
+          .field = "position"};
     }
   }
   return {};

@@ -14,10 +14,9 @@ namespace pointwright {
 
 /// A named scalar per sample, in the type of the file it came from: it leaves with the bits it came with.
 struct ScalarAttribute {
-  using Values =
-      std::variant<std::vector<std::int8_t>, std::vector<std::uint8_t>, std::vector<std::int16_t>,
-                   std::vector<std::uint16_t>, std::vector<std::int32_t>, std::vector<std::uint32_t>,
-                   std::vector<float>, std::vector<double>>;
+  using Values = std::variant<std::vector<std::int8_t>, std::vector<std::uint8_t>, std::vector<std::int16_t>,
+                              std::vector<std::uint16_t>, std::vector<std::int32_t>,
+                              std::vector<std::uint32_t>, std::vector<float>, std::vector<double>>;
   std::string name;
   Values values;
 
@@ -35,17 +34,17 @@ using TexCoord = std::array<float, 2>;
 struct Cloud {
   Vec3d origin = Vec3d::Zero();
   Points position;
-  Points normal;                          ///< empty, or N unit vectors
-  std::vector<Rgba> color;                ///< empty, or N; alpha 255 where the file had none
+  Points normal;            ///< empty, or N unit vectors
+  std::vector<Rgba> color;  ///< empty, or N; alpha 255 where the file had none
   bool color_has_alpha = false;
-  std::vector<TexCoord> texcoord;         ///< empty, or N
-  std::vector<ScalarAttribute> scalars;   ///< every further property of the file, by name
+  std::vector<TexCoord> texcoord;        ///< empty, or N
+  std::vector<ScalarAttribute> scalars;  ///< every further property of the file, by name
   /// Stable id of each sample: its index in the caller's order. A permutation of 0..N-1.
   std::vector<std::uint32_t> id;
   /// The positions as the file had them, 3 per sample, where origin + position does not give them back to the
   /// bit (double-precision files, and float files that lie far from zero). Empty where it does.
   std::vector<std::array<double, 3>> exact_position;
-  bool position_is_double = false;        ///< the file's positions were float64, and leave as float64
+  bool position_is_double = false;  ///< the file's positions were float64, and leave as float64
 
   [[nodiscard]] std::size_t size() const { return position.size(); }
   [[nodiscard]] bool has_normals() const { return !normal.empty(); }

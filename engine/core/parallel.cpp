@@ -9,8 +9,8 @@
 
 namespace pointwright {
 
-void parallel_for(std::size_t count, const std::function<void(std::size_t, std::size_t)>& body, std::size_t block,
-                  const ExecutionContext* context) {
+void parallel_for(std::size_t count, const std::function<void(std::size_t, std::size_t)>& body,
+                  std::size_t block, const ExecutionContext* context) {
   if (count == 0) return;
   const std::size_t blocks = (count + block - 1) / block;
   const auto run = [&](std::size_t b) {
@@ -39,7 +39,9 @@ void sort_by_key(std::vector<std::uint64_t>& keys, std::vector<std::uint32_t>& v
   for (const std::uint64_t key : keys) varying |= key ^ keys[0];
   for (std::size_t shift = 0; shift < 64; shift += kDigitBits) {
     if (((varying >> shift) & (kBuckets - 1)) == 0) continue;  // the digit is the same everywhere
-    const auto digit = [shift](std::uint64_t key) { return static_cast<std::size_t>((key >> shift) & (kBuckets - 1)); };
+    const auto digit = [shift](std::uint64_t key) {
+      return static_cast<std::size_t>((key >> shift) & (kBuckets - 1));
+    };
     parallel_for(
         n,
         [&](std::size_t begin, std::size_t end) {
@@ -77,6 +79,8 @@ void with_threads(int threads, const std::function<void()>& work) {
   arena.execute(work);
 }
 
-int thread_count() { return tbb::this_task_arena::max_concurrency(); }
+int thread_count() {
+  return tbb::this_task_arena::max_concurrency();
+}
 
 }  // namespace pointwright

@@ -1,6 +1,6 @@
 #pragma once
-// The only place of the engine that starts threads. Loops are cut into fixed blocks, so what a block computes never
-// depends on how many threads there are; reductions go over those blocks in order.
+// The only place of the engine that starts threads. Loops are cut into fixed blocks, so what a block computes
+// never depends on how many threads there are; reductions go over those blocks in order.
 
 #include <cstddef>
 #include <cstdint>
@@ -25,8 +25,8 @@ template <typename T>
 T parallel_sum(std::size_t count, T zero, const std::function<T(std::size_t, std::size_t)>& partial,
                std::size_t block = kParallelBlock) {
   std::vector<T> parts((count + block - 1) / block, zero);
-  parallel_for(count, [&](std::size_t begin, std::size_t end) { parts[begin / block] = partial(begin, end); },
-               block);
+  parallel_for(
+      count, [&](std::size_t begin, std::size_t end) { parts[begin / block] = partial(begin, end); }, block);
   T sum = zero;
   for (const T& part : parts) sum = sum + part;
   return sum;

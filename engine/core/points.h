@@ -10,14 +10,17 @@
 
 namespace pointwright {
 
-/// Samples that every vectorised kernel handles together; independent of the machine, so that the bytes are too.
+/// Samples that every vectorised kernel handles together; independent of the machine, so that the bytes are
+/// too.
 inline constexpr std::size_t kSimdBlock = 16;
 
 /// n rounded up to whole SIMD blocks.
-constexpr std::size_t padded_to_block(std::size_t n) { return (n + kSimdBlock - 1) / kSimdBlock * kSimdBlock; }
+constexpr std::size_t padded_to_block(std::size_t n) {
+  return (n + kSimdBlock - 1) / kSimdBlock * kSimdBlock;
+}
 
-/// N 3-vectors, structure of arrays. The arrays are padded to a whole number of SIMD blocks; the padding holds
-/// finite values (0 unless written) and is never part of the cloud.
+/// N 3-vectors, structure of arrays. The arrays are padded to a whole number of SIMD blocks; the padding
+/// holds finite values (0 unless written) and is never part of the cloud.
 class Points {
  public:
   Points() = default;

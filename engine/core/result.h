@@ -1,5 +1,6 @@
 #pragma once
-// Expected failures travel as values. std::expected is not in C++20, so this is the small part of it that we need.
+// Expected failures travel as values. std::expected is not in C++20, so this is the small part of it that we
+// need.
 
 #include <optional>
 #include <string>
@@ -12,16 +13,16 @@ namespace pointwright {
 
 /// Why an operation of the engine could not be done. server/http/error_map.cpp maps each to a status.
 enum class ErrorCode {
-  kInvalidArgument,     ///< a parameter is outside its stated range; `field` names it
-  kMalformedData,       ///< bytes that are not what they claim to be
-  kUnsupportedFormat,   ///< a format, version or feature that we do not read
-  kNonFinite,           ///< NaN or infinity where a finite number is owed
-  kOutOfRange,          ///< coordinates beyond 1e9, or an extent too small for its offset
-  kTooLarge,            ///< a stated limit is exceeded; `limit` and `actual` say by how much
-  kEmptyCloud,          ///< no sample at all
-  kEmptyRegion,         ///< a zero- or one-region without any sample or volume
-  kRegionsIntersect,    ///< the zero- and one-region meet (paper §4: their intersection must be empty)
-  kCancelled,           ///< the execution context was cancelled
+  kInvalidArgument,    ///< a parameter is outside its stated range; `field` names it
+  kMalformedData,      ///< bytes that are not what they claim to be
+  kUnsupportedFormat,  ///< a format, version or feature that we do not read
+  kNonFinite,          ///< NaN or infinity where a finite number is owed
+  kOutOfRange,         ///< coordinates beyond 1e9, or an extent too small for its offset
+  kTooLarge,           ///< a stated limit is exceeded; `limit` and `actual` say by how much
+  kEmptyCloud,         ///< no sample at all
+  kEmptyRegion,        ///< a zero- or one-region without any sample or volume
+  kRegionsIntersect,   ///< the zero- and one-region meet (paper §4: their intersection must be empty)
+  kCancelled,          ///< the execution context was cancelled
 };
 
 struct Error {
@@ -36,8 +37,10 @@ struct Error {
 template <typename T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}      // NOLINT(google-explicit-constructor)
-  Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT(google-explicit-constructor)
+  Result(T value)
+      : state_(std::in_place_index<0>, std::move(value)) {}  // NOLINT(google-explicit-constructor)
+  Result(Error error)
+      : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT(google-explicit-constructor)
 
   [[nodiscard]] bool ok() const { return state_.index() == 0; }
   explicit operator bool() const { return ok(); }

@@ -57,7 +57,8 @@ struct CellSplit {
   Vec3d axis = Vec3d::Zero();  // a sample belongs to part 0 where normal . axis >= 0
 };
 
-CellSplit split_cell(const Points& position, const Points& normal, const std::uint32_t* begin, const std::uint32_t* end) {
+CellSplit split_cell(const Points& position, const Points& normal, const std::uint32_t* begin,
+                     const std::uint32_t* end) {
   CellSplit split;
   Mat3d spread = Mat3d::Zero();
   for (const std::uint32_t* i = begin; i != end; ++i) {
@@ -147,25 +148,37 @@ void gather_cells(const Points& position, const Points& normal, const Grid& grid
   for (std::uint32_t& q : base.counterpart) q = rank[q];
 }
 
-// The first kSmoothingNeighbors neighbours on the same side, repeated in turn where there are fewer: smoothing must
-// not pull opposite sheets together.
-NeighborGraph same_side_graph(const BaseSurface& base) {
+// The nearest kCachedNeighbors on the same side: neither smoothing nor projection may join opposite sheets.
+// Short rows are filled with the sample itself.
+NeighborGraph same_side_graph(const Points& position, const Points& normal, const ExecutionContext& context) {
+  const NeighborGraph all = build_neighbor_graph(position, 2 * kCachedNeighbors, &context);
   NeighborGraph graph;
-  graph.count = base.graph.count;
-  graph.k = std::min(kSmoothingNeighbors, base.graph.k);
+  graph.count = all.count;
+  graph.k = std::min(kCachedNeighbors, all.k);
   graph.lanes.assign(padded_to_block(graph.count) * graph.k, 0U);
   parallel_for(graph.count, [&](std::size_t begin, std::size_t end) {
     for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
-      std::array<std::uint32_t, kSmoothingNeighbors> same{};
       std::uint32_t count = 0;
-      for (std::uint32_t j = 0; j < base.graph.k && count < graph.k; ++j) {
-        const std::uint32_t q = base.graph.index(i, j);
-        if (base.normal[i].dot(base.normal[q]) > 0.0F) same[count++] = q;
+      for (std::uint32_t j = 0; j < all.k && count < graph.k; ++j) {
+        const std::uint32_t q = all.index(i, j);
+        if (normal[i].dot(normal[q]) > 0.0F) graph.index(i, count++) = q;
       }
-      for (std::uint32_t j = 0; j < graph.k; ++j) graph.index(i, j) = count > 0 ? same[j % count] : i;
+      while (count < graph.k) graph.index(i, count++) = i;
     }
   });
   return graph;
+}
+
+// The first k columns of a graph.
+NeighborGraph narrowed(const NeighborGraph& graph, std::uint32_t k) {
+  NeighborGraph result;
+  result.count = graph.count;
+  result.k = std::min(k, graph.k);
+  result.lanes.assign(padded_to_block(graph.count) * result.k, 0U);
+  for (std::size_t i = 0; i < graph.count; ++i) {
+    for (std::uint32_t j = 0; j < result.k; ++j) result.index(i, j) = graph.index(i, j);
+  }
+  return result;
 }
 
 // Normals of the smoothed Q by plane fits over its same-side neighbours, on the side of the old normals.
@@ -191,7 +204,8 @@ float median_radius(const Points& position, const NeighborGraph& graph, std::uin
   k = std::min(k, graph.k);
   if (k == 0) return 0.0F;
   std::vector<float> radius(position.size());
-  for (std::size_t i = 0; i < position.size(); ++i) radius[i] = (position[graph.index(i, k - 1)] - position[i]).norm();
+  for (std::size_t i = 0; i < position.size(); ++i)
+    radius[i] = (position[graph.index(i, k - 1)] - position[i]).norm();
   const auto middle = radius.begin() + static_cast<std::ptrdiff_t>(radius.size() / 2);
   std::nth_element(radius.begin(), middle, radius.end());
   return *middle;
@@ -199,31 +213,35 @@ float median_radius(const Points& position, const NeighborGraph& graph, std::uin
 
 }  // namespace
 
-Result<BaseSurface> build_base_surface(const Points& position, const Points& normal, const Vec3d& origin, float scale,
-                                       const ExecutionContext& context) {
+Result<BaseSurface> build_base_surface(const Points& position, const Points& normal, const Vec3d& origin,
+                                       float scale, const ExecutionContext& context) {
   POINTWRIGHT_CHECK(scale > 0.0F, "a base needs a scale");
   const double cell = kCellOfScale * static_cast<double>(scale);
   BaseSurface base;
   base.scale = scale;
   gather_cells(position, normal, sort_into_cells(position, origin, cell), base);
-  base.graph = build_neighbor_graph(base.position, kCachedNeighbors, &context);
+  base.graph = same_side_graph(base.position, base.normal, context);
   if (context.is_cancelled()) return cancelled_error();
 
-  // Variances add: a cell's uniform density has cell^2 / 12 an axis, the compact weights (1 - d^2/r^2)^4 of the
-  // least-squares planes r^2 / 12; the umbrella supplies the rest of scale^2.
+  // Variances add: a cell's uniform density has cell^2 / 12 an axis, the compact weights (1 - d^2/r^2)^4 of
+  // the least-squares planes r^2 / 12; the umbrella supplies the rest of scale^2.
   const double radius = static_cast<double>(median_radius(base.position, base.graph, kPlaneNeighbors));
-  const double rest = static_cast<double>(scale) * static_cast<double>(scale) - (cell * cell + radius * radius) / 12.0;
-  const NeighborGraph smoothing_graph = same_side_graph(base);
+  const double rest =
+      static_cast<double>(scale) * static_cast<double>(scale) - (cell * cell + radius * radius) / 12.0;
+  const NeighborGraph smoothing_graph = narrowed(base.graph, kSmoothingNeighbors);
   if (rest > 0.0 && smoothing_graph.k > 0 && base.position.size() > 2 * kSmoothingNeighbors) {
-    auto smoothed = smooth_to_scale(base.position, base.normal, smoothing_graph, static_cast<float>(std::sqrt(rest)),
-                                    SmoothingDirection::kAlongNormal, &context);
+    auto smoothed =
+        smooth_to_scale(base.position, base.normal, smoothing_graph, static_cast<float>(std::sqrt(rest)),
+                        SmoothingDirection::kAlongNormal, &context);
     if (!smoothed) return smoothed.error();
     base.iterations = smoothed.value().iterations;
     base.position = std::move(smoothed).value().points;
-    base.graph = build_neighbor_graph(base.position, kCachedNeighbors, &context);
+    refit_normals(base.position, narrowed(base.graph, kSmoothingNeighbors), base.normal);
+    base.graph = same_side_graph(base.position, base.normal, context);
     if (context.is_cancelled()) return cancelled_error();
+  } else {
+    refit_normals(base.position, smoothing_graph, base.normal);
   }
-  refit_normals(base.position, same_side_graph(base), base.normal);
   return base;
 }
 

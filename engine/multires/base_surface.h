@@ -19,24 +19,21 @@ inline constexpr std::uint32_t kCachedNeighbors = 24;
 /// Q: M smoothed samples that define a degree-1 moving least-squares surface.
 struct BaseSurface {
   Points position;
-  Points normal;                           ///< unit, on the side of the samples they stand for
-  NeighborGraph graph;                     ///< kCachedNeighbors neighbours
+  Points normal;        ///< unit, on the side of the samples they stand for
+  NeighborGraph graph;  ///< kCachedNeighbors neighbours on the same side; short rows repeat the sample
   std::vector<std::uint32_t> counterpart;  ///< per sample of P: the sample of Q that stands for it
   float scale = 0.0F;                      ///< smoothing scale of the whole, model units
   std::uint32_t iterations = 0;            ///< umbrella iterations spent
 };
 
-/// One sample of Q for each cell of a grid with fixed origin in model space and cell 0.7 scale (two where opposite
-/// sheets share a cell), at the centroid; then umbrella smoothing along the normals until grid, umbrella and moving
-/// least squares together amount to a Gaussian of standard deviation `scale`. The grid is what makes a base mean the
-/// same on a preview and on the full scan, keeps it even (no samples pile up under smoothing), and makes the cost
-/// independent of the scale.
-/// Shapes:      N samples with unit normals, consistently oriented; M <= 2 N
-/// Pre:         scale > 0
-/// Errors:      kInvalidArgument (scale out of reach), kCancelled
-/// Cost:        O(N) sort and O(M k)
-/// Determinism: bitwise equal for any thread count
-Result<BaseSurface> build_base_surface(const Points& position, const Points& normal, const Vec3d& origin, float scale,
-                                       const ExecutionContext& context);
+/// One sample of Q for each cell of a grid with fixed origin in model space and cell 0.7 scale (two where
+/// opposite sheets share a cell), at the centroid; then umbrella smoothing along the normals until grid,
+/// umbrella and moving least squares together amount to a Gaussian of standard deviation `scale`. The grid is
+/// what makes a base mean the same on a preview and on the full scan, keeps it even (no samples pile up under
+/// smoothing), and makes the cost independent of the scale. Shapes:      N samples with unit normals,
+/// consistently oriented; M <= 2 N Pre:         scale > 0 Errors:      kInvalidArgument (scale out of reach),
+/// kCancelled Cost:        O(N) sort and O(M k) Determinism: bitwise equal for any thread count
+Result<BaseSurface> build_base_surface(const Points& position, const Points& normal, const Vec3d& origin,
+                                       float scale, const ExecutionContext& context);
 
 }  // namespace pointwright

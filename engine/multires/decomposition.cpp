@@ -1,4 +1,5 @@
-// Alexa et al., "Point set surfaces", 2001 (the projection); adaptive damping instead of the paper's fixed 0.5.
+// Alexa et al., "Point set surfaces", 2001 (the projection); adaptive damping instead of the paper's fixed
+// 0.5.
 #include "engine/multires/decomposition.h"
 
 #include <algorithm>
@@ -33,18 +34,26 @@ class Projector {
  public:
   Projector(const BaseSurface& base, const KdTree& tree) : base_(base), tree_(tree) {}
 
-  // The weighted plane of Q's samples around r, by walking the cached graph from `q` (updated to the nearest found).
+  // The weighted plane of Q's samples around r, by walking the cached graph from `q` (updated to the nearest
+  // found).
   Plane plane_by_walk(const Vec3f& r, std::uint32_t& q, const Plane& last) {
     q = walk(r, q);
     count_ = 0;
     candidate(q, r);
-    for (std::uint32_t j = 0; j < base_.graph.k; ++j) candidate(base_.graph.index(q, j), r);
+    for (std::uint32_t j = 0; j < base_.graph.k; ++j) {
+      if (base_.graph.index(q, j) != q) candidate(base_.graph.index(q, j), r);
+    }
     return fit(r, last);
   }
   Plane plane_by_tree(const Vec3f& r, const Plane& last) {
-    tree_.nearest(r, kCachedNeighbors + 1, found_);
+    tree_.nearest(r, 2 * (kCachedNeighbors + 1), found_);
     count_ = 0;
-    for (const Neighbor& neighbor : found_) index_[count_] = neighbor.index, distance_sq_[count_++] = neighbor.distance_sq;
+    for (const Neighbor& neighbor : found_) {
+      if (count_ > kCachedNeighbors) break;
+      if (base_.normal[neighbor.index].cast<double>().dot(last.normal) <= 0.0) continue;  // another sheet
+      index_[count_] = neighbor.index;
+      distance_sq_[count_++] = neighbor.distance_sq;
+    }
     return fit(r, last);
   }
 
@@ -127,7 +136,8 @@ void iterate(const Vec3d& p, double tolerance, std::uint32_t limit, bool adaptiv
       state.converged = true;
       break;
     }
-    if (adaptive && i > 0) damping = step > 0.7 * last_step ? std::max(kMinDamping, 0.5 * damping) : std::min(1.0, 1.5 * damping);
+    if (adaptive && i > 0)
+      damping = step > 0.7 * last_step ? std::max(kMinDamping, 0.5 * damping) : std::min(1.0, 1.5 * damping);
     last_step = step;
     state.r += damping * (projected - state.r);
   }
@@ -136,8 +146,9 @@ void iterate(const Vec3d& p, double tolerance, std::uint32_t limit, bool adaptiv
 
 }  // namespace
 
-Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base, float spacing,
-                                const DecomposeParams& params, const ExecutionContext& context) {
+Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base,
+                                float spacing, const DecomposeParams& params,
+                                const ExecutionContext& context) {
   const std::size_t n = position.size();
   Decomposition result;
   result.base.resize(n);
@@ -162,13 +173,15 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
           const Plane own_plane{base.position[own].cast<double>(), base.normal[own].cast<double>()};
           std::uint32_t q = own;
           BasePoint found{.r = project(p, own_plane), .plane = own_plane};
-          iterate(p, tolerance, params.walk_limit, true,
-                  [&](const Vec3f& r, const Plane& last) { return projector.plane_by_walk(r, q, last); }, found);
+          iterate(
+              p, tolerance, params.walk_limit, true,
+              [&](const Vec3f& r, const Plane& last) { return projector.plane_by_walk(r, q, last); }, found);
           if (!found.converged) {
             found.r = project(p, own_plane);
             found.plane = own_plane;
-            iterate(p, tolerance, params.tree_limit, false,
-                    [&](const Vec3f& r, const Plane& last) { return projector.plane_by_tree(r, last); }, found);
+            iterate(
+                p, tolerance, params.tree_limit, false,
+                [&](const Vec3f& r, const Plane& last) { return projector.plane_by_tree(r, last); }, found);
             if (!found.converged) ++count.at_limit;
           }
           count.iterations += found.iterations;

@@ -23,25 +23,26 @@ struct Decomposition {
 };
 
 struct DecomposeParams {
-  float tolerance_spacing = 1e-3F;  ///< converged where a step moves less than this times the median sample spacing
-  std::uint32_t walk_limit = 8;     ///< Newton steps over the cached graph before the tree takes over
-  std::uint32_t tree_limit = 50;    ///< Newton steps with exact neighbours and damping 0.5
+  float tolerance_spacing =
+      1e-3F;  ///< converged where a step moves less than this times the median sample spacing
+  std::uint32_t walk_limit = 30;  ///< Newton steps over the cached graph before the tree takes over
+  std::uint32_t tree_limit = 50;  ///< Newton steps with exact neighbours and damping 0.5
   friend bool operator==(const DecomposeParams&, const DecomposeParams&) = default;
 };
 
-/// For every p the point r of the moving least-squares surface of Q with p - r normal to it. Each step fits the
-/// weighted plane to the samples of Q around the current estimate, weights (1 - d^2/r_k^2)^4 that vanish where the
-/// neighbour set changes, and projects p onto it; steps are damped adaptively, the last one is not damped, so
-/// p = r + d n holds by construction. The start is p's own counterpart, not the nearest sample of Q, which may lie
-/// on another sheet.
-/// Where no base point is found (limit reached with a residual above 0.05 spacings, a flipped normal, |d| beyond
-/// four scales) the plane through the counterpart with its normal stands in, and is counted.
-/// Shapes:      N samples with unit normals; spacing > 0 is their median spacing
+/// For every p the point r of the moving least-squares surface of Q with p - r normal to it. Each step fits
+/// the weighted plane to the samples of Q around the current estimate, weights (1 - d^2/r_k^2)^4 that vanish
+/// where the neighbour set changes, and projects p onto it; steps are damped adaptively, the last one is not
+/// damped, so p = r + d n holds by construction. The start is p's own counterpart, not the nearest sample of
+/// Q, which may lie on another sheet. Where no base point is found (limit reached with a residual above 0.05
+/// spacings, a flipped normal, |d| beyond four scales) the plane through the counterpart with its normal
+/// stands in, and is counted. Shapes:      N samples with unit normals; spacing > 0 is their median spacing
 /// Errors:      kCancelled
 /// Cost:        O(N iterations k); about 2.5 iterations a sample
 /// Determinism: bitwise equal for any thread count
 /// Cancels:     between blocks of samples
-Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base, float spacing,
-                                const DecomposeParams& params, const ExecutionContext& context);
+Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base,
+                                float spacing, const DecomposeParams& params,
+                                const ExecutionContext& context);
 
 }  // namespace pointwright

@@ -37,7 +37,8 @@ float median(std::vector<float> values) {
 
 // One band: fills `below` with the base level of `above` and returns its detail coefficients.
 Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origin, float scale, float spacing,
-                                          const ExecutionContext& context, Level& below, DecompositionReport& report) {
+                                          const ExecutionContext& context, Level& below,
+                                          DecompositionReport& report) {
   report.scale = scale;
   if (!(scale > 0.0F)) {  // all samples coincide: the surface is its own base
     below = above;
@@ -69,24 +70,33 @@ Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origi
 
 Result<void> validate(const HierarchyParams& params) {
   if (params.scales.size() != 1) {
-    return Error{.code = ErrorCode::kInvalidArgument, .message = "exactly one band is supported", .field = "scales",
-                 .limit = 1, .actual = static_cast<double>(params.scales.size())};
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "exactly one band is supported",
+                 .field = "scales",
+                 .limit = 1,
+                 .actual = static_cast<double>(params.scales.size())};
   }
   for (const float scale : params.scales) {
     if (!(scale >= 1e-4F && scale <= 0.2F)) {
       return Error{.code = ErrorCode::kInvalidArgument,
                    .message = "a scale is a fraction of the bounding-box diagonal between 0.0001 and 0.2",
-                   .field = "scales", .limit = 0.2, .actual = static_cast<double>(scale)};
+                   .field = "scales",
+                   .limit = 0.2,
+                   .actual = static_cast<double>(scale)};
     }
   }
   if (params.neighbors < 4 || params.neighbors > 32) {
-    return Error{.code = ErrorCode::kInvalidArgument, .message = "neighbors must lie between 4 and 32",
-                 .field = "neighbors", .limit = 32, .actual = static_cast<double>(params.neighbors)};
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "neighbors must lie between 4 and 32",
+                 .field = "neighbors",
+                 .limit = 32,
+                 .actual = static_cast<double>(params.neighbors)};
   }
   return {};
 }
 
-Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& params, const ExecutionContext& context) {
+Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& params,
+                                  const ExecutionContext& context) {
   if (const auto valid = validate(params); !valid) return valid.error();
   if (cloud.size() == 0) {
     return Error{.code = ErrorCode::kEmptyCloud, .message = "the cloud has no samples", .field = "cloud"};
@@ -116,9 +126,11 @@ Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& par
   const float diagonal = bounds_of(cloud.position).diagonal();
   const float spacing = median(result.spacing);
   for (std::size_t band = bands; band-- > 0;) {
-    context.begin_phase("decomposition", 0.55 + 0.45 * static_cast<double>(bands - 1 - band) / static_cast<double>(bands));
-    auto detail = decompose_band(result.surface.levels[band + 1], cloud.origin, params.scales[band] * diagonal, spacing,
-                                 context, result.surface.levels[band], result.reports[band]);
+    context.begin_phase("decomposition",
+                        0.55 + 0.45 * static_cast<double>(bands - 1 - band) / static_cast<double>(bands));
+    auto detail =
+        decompose_band(result.surface.levels[band + 1], cloud.origin, params.scales[band] * diagonal, spacing,
+                       context, result.surface.levels[band], result.reports[band]);
     if (!detail) return detail.error();
     result.surface.detail[band] = std::move(detail).value();
   }

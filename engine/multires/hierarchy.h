@@ -13,8 +13,9 @@
 namespace pointwright {
 
 struct HierarchyParams {
-  /// Smoothing scale of each base level: the standard deviation of the Gaussian that the smoothing equals, as a
-  /// fraction of the bounding-box diagonal, in (0, 0.2]; strictly descending, level 0 first. One band today.
+  /// Smoothing scale of each base level: the standard deviation of the Gaussian that the smoothing equals, as
+  /// a fraction of the bounding-box diagonal, in (0, 0.2]; strictly descending, level 0 first. One band
+  /// today.
   std::vector<float> scales = {0.02F};
   std::uint32_t neighbors = 10;  ///< k of §2.1, 4 to 32 (the paper: 8 to 12)
   friend bool operator==(const HierarchyParams&, const HierarchyParams&) = default;
@@ -25,13 +26,13 @@ Result<void> validate(const HierarchyParams& params);
 
 /// How the damped Newton iteration of one band ended (§3.4).
 struct DecompositionReport {
-  float scale = 0.0F;               ///< of the band's base, model units
-  std::size_t base_samples = 0;     ///< samples of the coarse cloud Q that carries the base surface
-  std::size_t at_limit = 0;         ///< samples whose iteration ended at the limit, above the tolerance
-  std::size_t fallback = 0;         ///< of those and the flipped: samples that took the fallback plane
-  std::size_t flipped = 0;          ///< samples whose base normal opposes their own
+  float scale = 0.0F;            ///< of the band's base, model units
+  std::size_t base_samples = 0;  ///< samples of the coarse cloud Q that carries the base surface
+  std::size_t at_limit = 0;      ///< samples whose iteration ended at the limit, above the tolerance
+  std::size_t fallback = 0;      ///< of those and the flipped: samples that took the fallback plane
+  std::size_t flipped = 0;       ///< samples whose base normal opposes their own
   double mean_iterations = 0.0;
-  float max_detail = 0.0F;          ///< largest |d|, model units
+  float max_detail = 0.0F;  ///< largest |d|, model units
   float rms_detail = 0.0F;
 };
 
@@ -45,11 +46,11 @@ struct Hierarchy {
 };
 
 /// Paper:       §3, §3.4; engine/README.md says where it departs
-/// Shapes:      N >= 1 samples in coherent order; uploaded normals, where the cloud has them, are kept and orient
-/// Errors:      kInvalidArgument, kEmptyCloud, kCancelled
-/// Cost:        O(N k log N); about 120 bytes a sample while it runs
-/// Determinism: bitwise equal for any thread count
-/// Cancels:     between phases and between blocks of samples
-Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& params, const ExecutionContext& context);
+/// Shapes:      N >= 1 samples in coherent order; uploaded normals, where the cloud has them, are kept and
+/// orient Errors:      kInvalidArgument, kEmptyCloud, kCancelled Cost:        O(N k log N); about 120 bytes a
+/// sample while it runs Determinism: bitwise equal for any thread count Cancels:     between phases and
+/// between blocks of samples
+Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& params,
+                                  const ExecutionContext& context);
 
 }  // namespace pointwright

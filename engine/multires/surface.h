@@ -23,7 +23,9 @@ struct MultiresSurface {
   std::vector<std::vector<float>> detail;  ///< n columns d_0 .. d_{n-1}, signed along n_k, model units
 
   [[nodiscard]] std::size_t band_count() const { return detail.size(); }
-  [[nodiscard]] std::size_t sample_count() const { return levels.empty() ? 0 : levels.back().position.size(); }
+  [[nodiscard]] std::size_t sample_count() const {
+    return levels.empty() ? 0 : levels.back().position.size();
+  }
   [[nodiscard]] const Level& finest() const { return levels.back(); }
 };
 

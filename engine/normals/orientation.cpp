@@ -1,5 +1,6 @@
-// Spanning-tree propagation after Hoppe et al., "Surface reconstruction from unorganized points", 1992, with the
-// reflected edge criterion of König and Gumhold, "Consistent propagation of normal orientations in point clouds", 2009.
+// Spanning-tree propagation after Hoppe et al., "Surface reconstruction from unorganized points", 1992, with
+// the reflected edge criterion of König and Gumhold, "Consistent propagation of normal orientations in point
+// clouds", 2009.
 #include "engine/normals/orientation.h"
 
 #include <algorithm>
@@ -37,7 +38,9 @@ Edge make_edge(const Points& points, const Points& normals, std::uint32_t a, std
 // Disjoint sets that remember, per sample, whether its side is opposed to that of its set's root.
 class SidedSets {
  public:
-  explicit SidedSets(std::size_t n) : parent_(n), opposed_(n, 0) { std::iota(parent_.begin(), parent_.end(), 0U); }
+  explicit SidedSets(std::size_t n) : parent_(n), opposed_(n, 0) {
+    std::iota(parent_.begin(), parent_.end(), 0U);
+  }
 
   struct Root {
     std::uint32_t index;
@@ -115,8 +118,8 @@ std::vector<Edge> sorted_edges(const Points& points, const Points& normals, cons
   return sorted;
 }
 
-// Of a component's samples that are extreme along x, y or z, the one whose normal points most along that axis tells
-// the outside.
+// Of a component's samples that are extreme along x, y or z, the one whose normal points most along that axis
+// tells the outside.
 struct Extremes {
   std::array<float, 6> value;
   std::array<std::uint32_t, 6> sample{};
@@ -137,7 +140,8 @@ struct Extremes {
     float best = 0.0F;
     bool inward = false;
     for (std::size_t side = 0; side < 6; ++side) {
-      const float along = normals[sample[side]][static_cast<Eigen::Index>(side / 2)] * (side % 2 == 0 ? 1.0F : -1.0F);
+      const float along =
+          normals[sample[side]][static_cast<Eigen::Index>(side / 2)] * (side % 2 == 0 ? 1.0F : -1.0F);
       if (std::abs(along) > best) {
         best = std::abs(along);
         inward = along < 0.0F;

@@ -11,7 +11,8 @@ bool smallest_eigenvector(const Mat3d& matrix, Vec3d& vector) {
     return false;
   }
   const Mat3d m = matrix / trace;
-  // The adjugate has the same eigenvectors with eigenvalues l2 l3, l1 l3, l1 l2: the smallest becomes the largest.
+  // The adjugate has the same eigenvectors with eigenvalues l2 l3, l1 l3, l1 l2: the smallest becomes the
+  // largest.
   Mat3d a;
   a(0, 0) = m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2);
   a(1, 1) = m(0, 0) * m(2, 2) - m(0, 2) * m(0, 2);

@@ -1,5 +1,6 @@
-// Taubin, "A signal processing approach to fair surface design", 1995; Desbrun et al., "Implicit fairing of irregular
-// meshes using diffusion and curvature flow", 1999; local volume preservation after Hubeli and Gross, 2001.
+// Taubin, "A signal processing approach to fair surface design", 1995; Desbrun et al., "Implicit fairing of
+// irregular meshes using diffusion and curvature flow", 1999; local volume preservation after Hubeli and
+// Gross, 2001.
 #include "engine/smoothing/umbrella.h"
 
 #include <algorithm>
@@ -61,7 +62,8 @@ ReverseGraph reverse(const NeighborGraph& graph) {
 }
 
 // Eq. (8) at one sample.
-Vec3f umbrella(const Points& points, const NeighborGraph& graph, const std::vector<float>& weights, std::size_t i) {
+Vec3f umbrella(const Points& points, const NeighborGraph& graph, const std::vector<float>& weights,
+               std::size_t i) {
   const Vec3f p = points[i];
   Vec3f sum = Vec3f::Zero();
   if (weights.empty()) {
@@ -128,12 +130,18 @@ void add_step(const Points& change, SmoothingDirection direction, const Points& 
 
 Result<void> validate(const UmbrellaParams& params) {
   if (!(params.lambda > 0.0F && params.lambda <= 0.7F)) {
-    return Error{.code = ErrorCode::kInvalidArgument, .message = "lambda must lie in (0, 0.7]", .field = "lambda",
-                 .limit = 0.7, .actual = static_cast<double>(params.lambda)};
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "lambda must lie in (0, 0.7]",
+                 .field = "lambda",
+                 .limit = 0.7,
+                 .actual = static_cast<double>(params.lambda)};
   }
   if (params.iterations > 100'000) {
-    return Error{.code = ErrorCode::kInvalidArgument, .message = "at most 100,000 iterations", .field = "iterations",
-                 .limit = 100'000, .actual = static_cast<double>(params.iterations)};
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "at most 100,000 iterations",
+                 .field = "iterations",
+                 .limit = 100'000,
+                 .actual = static_cast<double>(params.iterations)};
   }
   return {};
 }
@@ -163,12 +171,14 @@ Result<Points> smooth(const Points& points, const Points& normals, const Neighbo
       add_step(step, params.direction, normals, result);
       continue;
     }
-    // Eq. (9): every neighbour of p moves by (p - p') / k. Gathered: sample i collects from those that list it.
+    // Eq. (9): every neighbour of p moves by (p - p') / k. Gathered: sample i collects from those that list
+    // it.
     const float share = 1.0F / static_cast<float>(graph.k);
     parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         Vec3f returned = Vec3f::Zero();
-        for (std::uint32_t r = listers.first[i]; r < listers.first[i + 1]; ++r) returned += step[listers.lister[r]];
+        for (std::uint32_t r = listers.first[i]; r < listers.first[i + 1]; ++r)
+          returned += step[listers.lister[r]];
         compensated.set(i, step[i] - share * returned);
       }
     });
@@ -177,11 +187,13 @@ Result<Points> smooth(const Points& points, const Points& normals, const Neighbo
   return result;
 }
 
-Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& normals, const NeighborGraph& graph,
-                                        float scale, SmoothingDirection direction, const ExecutionContext* context) {
+Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& normals,
+                                        const NeighborGraph& graph, float scale, SmoothingDirection direction,
+                                        const ExecutionContext* context) {
   constexpr std::uint32_t kMaxIterations = 10'000;
   if (!std::isfinite(scale) || scale < 0.0F) {
-    return Error{.code = ErrorCode::kInvalidArgument, .message = "the smoothing scale must be finite and not negative",
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "the smoothing scale must be finite and not negative",
                  .field = "scale"};
   }
   ScaledSmoothing result{.points = points};
@@ -196,8 +208,10 @@ Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& norm
     if (context != nullptr && context->is_cancelled()) return cancelled_error();
     if (result.iterations == kMaxIterations || reached <= stalled_at) {
       return Error{.code = ErrorCode::kInvalidArgument,
-                   .message = "the smoothing scale is out of reach of iteration at this density", .field = "scale",
-                   .limit = std::sqrt(reached), .actual = static_cast<double>(scale)};
+                   .message = "the smoothing scale is out of reach of iteration at this density",
+                   .field = "scale",
+                   .limit = std::sqrt(reached),
+                   .actual = static_cast<double>(scale)};
     }
     Moments trial = moments;
     trial.step(graph, static_cast<double>(kLambda));

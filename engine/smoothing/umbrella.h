@@ -12,8 +12,9 @@ namespace pointwright {
 
 enum class UmbrellaWeights {
   kUniform,          ///< w_i = 1
-  kInverseDistance,  ///< w_i = 1 / (|p_i - p| + 0.3 h), from the rest positions: the scale-dependent umbrella. The
-                     ///< paper's bare 1/|p_i - p| on moving samples pulls close pairs together without limit
+  kInverseDistance,  ///< w_i = 1 / (|p_i - p| + 0.3 h), from the rest positions: the scale-dependent
+                     ///< umbrella. The paper's bare 1/|p_i - p| on moving samples pulls close pairs together
+                     ///< without limit
 };
 
 enum class VolumePreservation {
@@ -30,8 +31,8 @@ struct UmbrellaParams {
   UmbrellaWeights weights = UmbrellaWeights::kUniform;
   VolumePreservation preserve = VolumePreservation::kNone;
   SmoothingDirection direction = SmoothingDirection::kFree;
-  float lambda = 0.5F;             ///< lambda of Eq. (7), in (0, 0.7]; beyond 0.8 compensated steps diverge
-  std::uint32_t iterations = 1;    ///< up to 100,000
+  float lambda = 0.5F;           ///< lambda of Eq. (7), in (0, 0.7]; beyond 0.8 compensated steps diverge
+  std::uint32_t iterations = 1;  ///< up to 100,000
   friend bool operator==(const UmbrellaParams&, const UmbrellaParams&) = default;
 };
 
@@ -39,28 +40,26 @@ struct UmbrellaParams {
 Result<void> validate(const UmbrellaParams& params);
 
 /// p' = p + lambda * umbrella(p), Eq. (7) and (8), `iterations` times, over the neighbourhoods of the graph.
-/// With local preservation a step is P += u - W^T u, u = lambda * umbrella: a bi-Laplacian flow that keeps the mean
-/// of all positions, gathered over reverse neighbours so that the result never depends on the thread count.
-/// Shapes:      N points, their graph, N unit normals (read only with kAlongNormal)
-/// Errors:      kInvalidArgument, kCancelled
-/// Cost:        O(iterations N k), parallel over samples
-/// Determinism: bitwise equal for any thread count
-/// Cancels:     between iterations
+/// With local preservation a step is P += u - W^T u, u = lambda * umbrella: a bi-Laplacian flow that keeps
+/// the mean of all positions, gathered over reverse neighbours so that the result never depends on the thread
+/// count. Shapes:      N points, their graph, N unit normals (read only with kAlongNormal) Errors:
+/// kInvalidArgument, kCancelled Cost:        O(iterations N k), parallel over samples Determinism: bitwise
+/// equal for any thread count Cancels:     between iterations
 Result<Points> smooth(const Points& points, const Points& normals, const NeighborGraph& graph,
                       const UmbrellaParams& params, const ExecutionContext* context = nullptr);
 
-/// Smooths to a scale: iterates plain uniform umbrella steps until the median over all samples of the kernel's
-/// standard deviation s_i reaches `scale`, the last step weakened to meet it. s_i^2 = var_i / 2 with
-/// var_i = (W^n |p|^2)_i - |(W^n p)_i|^2 over the rest positions: the variance of the weights that n steps have given
-/// to the neighbourhood, so the scale means the same at every density and on uneven samplings.
+/// Smooths to a scale: iterates plain uniform umbrella steps until the median over all samples of the
+/// kernel's standard deviation s_i reaches `scale`, the last step weakened to meet it. s_i^2 = var_i / 2 with
+/// var_i = (W^n |p|^2)_i - |(W^n p)_i|^2 over the rest positions: the variance of the weights that n steps
+/// have given to the neighbourhood, so the scale means the same at every density and on uneven samplings.
 struct ScaledSmoothing {
   Points points;
   std::uint32_t iterations = 0;
   float scale = 0.0F;  ///< the median reached, model units
 };
 /// Errors: kInvalidArgument (scale not finite or < 0; more than 10,000 iterations needed), kCancelled
-Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& normals, const NeighborGraph& graph,
-                                        float scale, SmoothingDirection direction,
+Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& normals,
+                                        const NeighborGraph& graph, float scale, SmoothingDirection direction,
                                         const ExecutionContext* context = nullptr);
 
 }  // namespace pointwright

@@ -1,4 +1,5 @@
-// Morton order: G. M. Morton, "A computer oriented geodetic data base and a new technique in file sequencing", 1966.
+// Morton order: G. M. Morton, "A computer oriented geodetic data base and a new technique in file
+// sequencing", 1966.
 #include "engine/spatial/coherent_order.h"
 
 #include <algorithm>
@@ -49,8 +50,8 @@ std::vector<std::uint32_t> coherent_order(const Points& points) {
     std::size_t end = begin + 1;
     while (end < n && keys[end] == keys[begin]) ++end;
     if (end - begin > 1) {
-      std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin), order.begin() + static_cast<std::ptrdiff_t>(end),
-                by_position);
+      std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin),
+                order.begin() + static_cast<std::ptrdiff_t>(end), by_position);
     }
     begin = end;
   }

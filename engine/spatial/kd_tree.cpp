@@ -21,8 +21,8 @@ struct PackedPoints {
   }
 };
 
-using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PackedPoints>, PackedPoints, 3,
-                                                  std::uint32_t>;
+using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PackedPoints>,
+                                                  PackedPoints, 3, std::uint32_t>;
 constexpr std::size_t kLeafSize = 12;
 
 }  // namespace
@@ -37,7 +37,8 @@ struct KdTree::Tree {
       packed.xyz[3 * i + 1] = points.y()[from];
       packed.xyz[3 * i + 2] = points.z()[from];
     }
-    if (n > 0) index = std::make_unique<Index>(3, packed, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize));
+    if (n > 0)
+      index = std::make_unique<Index>(3, packed, nanoflann::KDTreeSingleIndexAdaptorParams(kLeafSize));
   }
   [[nodiscard]] std::uint32_t original(std::uint32_t i) const { return subset.empty() ? i : subset[i]; }
 
@@ -53,7 +54,9 @@ KdTree::~KdTree() = default;
 KdTree::KdTree(KdTree&&) noexcept = default;
 KdTree& KdTree::operator=(KdTree&&) noexcept = default;
 
-std::size_t KdTree::size() const { return tree_->packed.kdtree_get_point_count(); }
+std::size_t KdTree::size() const {
+  return tree_->packed.kdtree_get_point_count();
+}
 
 void KdTree::nearest(const Vec3f& query, std::size_t k, std::vector<Neighbor>& found) const {
   k = std::min(k, size());

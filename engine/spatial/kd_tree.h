@@ -34,11 +34,12 @@ class KdTree {
 
   [[nodiscard]] std::size_t size() const;
 
-  /// The k nearest points, by distance, then index; fewer where the tree holds fewer. `found` holds the answer.
+  /// The k nearest points, by distance, then index; fewer where the tree holds fewer. `found` holds the
+  /// answer.
   void nearest(const Vec3f& query, std::size_t k, std::vector<Neighbor>& found) const;
 
-  /// All points within `radius` (a distance, not its square), by distance, then index, but at most `limit` of them,
-  /// the nearest; returns whether that limit cut the answer.
+  /// All points within `radius` (a distance, not its square), by distance, then index, but at most `limit` of
+  /// them, the nearest; returns whether that limit cut the answer.
   bool within(const Vec3f& query, float radius, std::size_t limit, std::vector<Neighbor>& found) const;
 
  private:
