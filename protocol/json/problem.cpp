@@ -9,110 +9,99 @@
 namespace pointwright::protocol {
 namespace {
 
-using enum ProblemType;
+using enum ProblemKind;
 
-/// In the order of the enumeration: problem_info() takes the type as the index, and a test compares them.
+/// In the order of the enumeration: problem_info() takes the kind as the index, and a test compares them.
 constexpr std::array kProblems{
-    ProblemInfo{kMalformedRequest, 400, "malformed-request", "Malformed request",
-                "The request line, a header, the query or the path is not what HTTP or this route takes.",
-                false},
-    ProblemInfo{kMalformedJson, 400, "malformed-json", "Malformed JSON",
-                "The body is not JSON in UTF-8 (RFC 8259).", false},
-    ProblemInfo{kEmptyBody, 400, "empty-body", "Empty body", "This route needs a body, and none came.",
-                false},
     ProblemInfo{
-        kForbiddenHost, 403, "forbidden-host", "Forbidden host",
-        "The Host header names another server than this one. Open the address that the daemon prints.",
+        kMalformedRequest, 400, "malformed-request", "The request is malformed",
+        "The head or the query of the request is not well-formed HTTP/1.1, or says two things at once.",
         false},
-    ProblemInfo{kForbiddenOrigin, 403, "forbidden-origin", "Forbidden origin",
-                "A page of another site tried to change something here. Only the viewer's own pages may.",
+    ProblemInfo{kMalformedJson, 400, "malformed-json", "The body is not JSON",
+                "The body is not a JSON document: a syntax error or invalid UTF-8.", false},
+    ProblemInfo{kEmptyBody, 400, "empty-body", "The body is empty", "This route needs a body, and none came.",
                 false},
-    ProblemInfo{kUnknownRoute, 404, "unknown-route", "Unknown path",
-                "Nothing is at this path. /openapi.yaml lists everything that is.", false},
-    ProblemInfo{kUnknownCloud, 404, "unknown-cloud", "Unknown cloud", "No cloud has this id.", false},
-    ProblemInfo{kUnknownSession, 404, "unknown-session", "Unknown session", "No session has this id.", false},
-    ProblemInfo{kUnknownEdit, 422, "unknown-edit", "Unknown edit",
-                "The session's history has no edit of this number.", false},
+    ProblemInfo{kInvalidValue, 422, "invalid-value", "A value is not acceptable",
+                "The document is well-formed, but a member is missing, unknown, repeated, nested too deep, "
+                "of the wrong type "
+                "or out of range. \"errors\" points at each.",
+                false},
+    ProblemInfo{kHostNotAllowed, 403, "host-not-allowed", "Host not allowed",
+                "The Host header names neither a loopback name nor one that the operator allowed. This "
+                "protects local servers against DNS rebinding.",
+                false},
+    ProblemInfo{kOriginNotAllowed, 403, "origin-not-allowed", "Origin not allowed",
+                "A page of another origin asked for a change. Only the server's own pages, and programs that "
+                "send no Origin, may.",
+                false},
+    ProblemInfo{kNotFound, 404, "not-found", "Not found",
+                "There is nothing under this path: the id is unknown, or what it named was deleted.", false},
     ProblemInfo{kMethodNotAllowed, 405, "method-not-allowed", "Method not allowed",
-                "This path exists, but not for this method. The Allow header lists those that it takes.",
-                false},
+                "The resource exists but does not take this method; Allow lists those it takes.", false},
     ProblemInfo{
         kNotAcceptable, 406, "not-acceptable", "Not acceptable",
         "None of the formats that the Accept header or the format parameter asks for can be given here.",
         false},
-    ProblemInfo{kRequestTimeout, 408, "request-timeout", "Request timeout",
-                "The request did not arrive in full within the time that it may take.", true},
-    ProblemInfo{kCloudInUse, 409, "cloud-in-use", "Cloud in use",
-                "A session still works on this cloud. Delete the session first.", false},
-    ProblemInfo{kSessionNotReady, 409, "session-not-ready", "Session not ready",
-                "The session is still being built. Wait until its state is \"ready\".", true},
-    ProblemInfo{kSessionFailed, 409, "session-failed", "Session failed",
-                "The session could not be built; its document says why.", false},
-    ProblemInfo{kLengthRequired, 411, "length-required", "Length required",
-                "A request with a body must say its length in Content-Length.", false},
-    ProblemInfo{kStaleRevision, 412, "stale-revision", "Stale revision",
-                "The session has changed since the revision in If-Match; \"revision\" is the current one.",
+    ProblemInfo{kRequestTimeout, 408, "request-timeout", "The request came too slowly",
+                "The head or the body did not arrive within its deadline.", false},
+    ProblemInfo{kWrongState, 409, "wrong-state", "Not possible in this state",
+                "The session is not ready: it is still building, or its building failed.", false},
+    ProblemInfo{kCloudInUse, 409, "cloud-in-use", "The cloud is in use",
+                "A session still uses the cloud; delete the session first.", false},
+    ProblemInfo{kLengthRequired, 411, "length-required", "Content-Length is required",
+                "Bodies need a Content-Length; chunked bodies are not accepted.", false},
+    ProblemInfo{kStaleRevision, 412, "stale-revision", "The session has moved on",
+                "If-Match names a revision that is no longer the current one; \"revision\" is.", false},
+    ProblemInfo{kBodyTooLarge, 413, "body-too-large", "The body is too large",
+                "The body exceeds the limit of its route. /v1/info lists the limits.", false},
+    ProblemInfo{kPathTooLong, 414, "path-too-long", "The path is too long", "The path exceeds its limit.",
                 false},
-    ProblemInfo{kBodyTooLarge, 413, "body-too-large", "Body too large",
-                "The body has more bytes than this route takes; \"limit\" says how many those are.", false},
-    ProblemInfo{kUriTooLong, 414, "uri-too-long", "URI too long",
-                "The request's path and query are too long.", false},
     ProblemInfo{kUnsupportedMediaType, 415, "unsupported-media-type", "Unsupported media type",
-                "This route does not take bodies of this Content-Type.", false},
-    ProblemInfo{kUnsupportedFormat, 415, "unsupported-format", "Unsupported format",
-                "The bytes are of a format, a version or a feature of one that is not read here.", false},
-    ProblemInfo{
-        kInvalidRequest, 422, "invalid-request", "Invalid request",
-        "The JSON is well-formed but not what this route takes; \"errors\" points at every member at fault.",
-        false},
-    ProblemInfo{kInvalidValue, 422, "invalid-value", "Invalid value",
-                "A value is outside the range that it may have.", false},
-    ProblemInfo{kMalformedData, 422, "malformed-data", "Malformed data",
-                "The bytes of the cloud are damaged, cut off, or not what they claim to be.", false},
-    ProblemInfo{kNonFinite, 422, "non-finite", "Value that is not finite",
-                "NaN or infinity stands where a finite number must. Uploads take nonfinite=drop to leave "
-                "such samples "
-                "out.",
+                "The Content-Type is not one that the route takes, or the body is compressed.", false},
+    ProblemInfo{kRangeNotSatisfiable, 416, "range-not-satisfiable", "Range not satisfiable",
+                "More than one range was asked for.", false},
+    ProblemInfo{kExpectationFailed, 417, "expectation-failed", "Expectation failed",
+                "The Expect header asks for something else than 100-continue.", false},
+    ProblemInfo{kRevisionRequired, 428, "revision-required", "If-Match is required",
+                "Edits name the revision that they build on: If-Match: \"r<revision>\".", false},
+    ProblemInfo{kTooMany, 429, "too-many", "A quota is used up",
+                "One more of these would exceed a quota; delete some first. /v1/info lists the limits.",
+                true},
+    ProblemInfo{kHeadTooLarge, 431, "head-too-large", "The request head is too large",
+                "The request line and headers exceed their limits in bytes or number.", false},
+    ProblemInfo{kInternalError, 500, "internal-error", "Internal error",
+                "The server failed. The log holds the details under the request id.", false},
+    ProblemInfo{kNotImplemented, 501, "not-implemented", "Not implemented",
+                "The method or transfer coding is unknown to this server.", false},
+    ProblemInfo{kOverloaded, 503, "overloaded", "The server is busy",
+                "Connections, streams or decoders are all in use, or the server is stopping. Retry later.",
+                true},
+    ProblemInfo{kHttpVersion, 505, "http-version-not-supported", "HTTP version not supported",
+                "This server speaks HTTP/1.1.", false},
+    ProblemInfo{kOutOfSpace, 507, "out-of-space", "No room left",
+                "The memory that the operator granted to clouds and sessions is used up; delete some first.",
+                true},
+    ProblemInfo{kMalformedCloud, 422, "malformed-cloud", "The file is damaged",
+                "The bytes are not what they claim to be: truncated, inconsistent, or not a point cloud.",
+                false},
+    ProblemInfo{kUnsupportedFormat, 415, "unsupported-format", "The format is not supported",
+                "The bytes are in a format, version or encoding that this server does not read.", false},
+    ProblemInfo{kNonFinite, 422, "non-finite", "A number is not finite",
+                "NaN or infinity stands where a finite number is owed. Uploads take ?nonfinite=drop to leave "
+                "such samples out.",
                 false},
     ProblemInfo{kOutOfRange, 422, "out-of-range", "Coordinates out of range",
-                "Coordinates lie beyond 1e9, or so far from zero that their differences are lost.", false},
-    ProblemInfo{kTooLarge, 422, "too-large", "Too large",
-                "The data holds, or claims to hold, more than a limit of this server allows.", false},
-    ProblemInfo{kEmptyCloud, 422, "empty-cloud", "Empty cloud", "The cloud has no sample.", false},
-    ProblemInfo{
-        kEmptyRegion, 422, "empty-region", "Empty region",
-        "An edit needs at least one sample in the zero-region and one in the one-region. Paint them first.",
-        false},
-    ProblemInfo{
-        kRegionsIntersect, 422, "regions-intersect", "Regions intersect",
-        "The zero-region and the one-region share samples. Remove them from one of the two, or paint with "
-        "\"steal\".",
-        false},
-    ProblemInfo{
-        kDecoderLimit, 422, "decoder-limit", "Decoder limit",
-        "The confined decoder ran out of the time or memory that one file may take, or was stopped while "
-        "reading it.",
-        false},
-    ProblemInfo{kPreconditionRequired, 428, "precondition-required", "Precondition required",
-                "An edit names the revision that it was made for: If-Match: \"r<revision>\".", false},
-    ProblemInfo{kTooManyRequests, 429, "too-many-requests", "Too many requests",
-                "More is going on than one client may have at a time.", true},
-    ProblemInfo{kHeadersTooLarge, 431, "headers-too-large", "Headers too large",
-                "The request's headers are longer than this server takes.", false},
-    ProblemInfo{
-        kInternalError, 500, "internal-error", "Internal error",
-        "Something is wrong with the server, not with the request. Its log has the details under the request "
-        "id.",
-        false},
-    ProblemInfo{kNotImplemented, 501, "not-implemented", "Not implemented",
-                "HTTP knows this method, this server does not.", false},
-    ProblemInfo{kOverloaded, 503, "overloaded", "Overloaded",
-                "The server is at one of its limits. Try again after the seconds in Retry-After.", true},
-    ProblemInfo{kCancelled, 503, "cancelled", "Cancelled",
-                "The work was cancelled before it was done; nothing changed.", true},
-    ProblemInfo{kShuttingDown, 503, "shutting-down", "Shutting down",
-                "The server is stopping, or not yet ready. Try again after the seconds in Retry-After.",
-                true},
+                "Coordinates beyond 1e9, or an extent too small for its distance from the origin.", false},
+    ProblemInfo{kTooManySamples, 413, "limit-exceeded", "A limit is exceeded",
+                "The content exceeds a stated limit; \"limit\" and \"actual\" say by how much.", false},
+    ProblemInfo{kEmptyCloud, 422, "empty-cloud", "The cloud is empty", "The file holds no sample at all.",
+                false},
+    ProblemInfo{kEmptyRegion, 422, "empty-region", "A region is empty",
+                "An edit needs at least one sample in the zero-region and one in the one-region.", false},
+    ProblemInfo{kRegionsIntersect, 422, "regions-intersect", "The regions intersect",
+                "The zero- and the one-region must not meet: a sample is in both, or two coincide.", false},
+    ProblemInfo{kCancelled, 409, "cancelled", "The work was cancelled",
+                "The session was deleted, or the server is stopping.", false},
 };
 
 /// JSON has one kind of number; whole ones are printed as such.
@@ -124,8 +113,8 @@ JsonDocument number_document(double value) {
 
 }  // namespace
 
-const ProblemInfo& problem_info(ProblemType type) {
-  return kProblems.at(static_cast<std::size_t>(type));
+const ProblemInfo& problem_info(ProblemKind kind) {
+  return kProblems.at(static_cast<std::size_t>(kind));
 }
 
 std::span<const ProblemInfo> all_problems() {
@@ -138,12 +127,12 @@ const ProblemInfo* find_problem(std::string_view slug) {
   return row == kProblems.end() ? nullptr : row;
 }
 
-ProblemType problem_of(ErrorCode code) {
+ProblemKind problem_of(ErrorCode code) {
   switch (code) {  // no default: a new code must be given its problem here
     case ErrorCode::kInvalidArgument:
       return kInvalidValue;
     case ErrorCode::kMalformedData:
-      return kMalformedData;
+      return kMalformedCloud;
     case ErrorCode::kUnsupportedFormat:
       return kUnsupportedFormat;
     case ErrorCode::kNonFinite:
@@ -151,7 +140,7 @@ ProblemType problem_of(ErrorCode code) {
     case ErrorCode::kOutOfRange:
       return kOutOfRange;
     case ErrorCode::kTooLarge:
-      return kTooLarge;
+      return kTooManySamples;
     case ErrorCode::kEmptyCloud:
       return kEmptyCloud;
     case ErrorCode::kEmptyRegion:
@@ -165,7 +154,7 @@ ProblemType problem_of(ErrorCode code) {
 }
 
 Problem to_problem(const Error& error) {
-  Problem problem{.type = problem_of(error.code), .detail = error.message};
+  Problem problem{.kind = problem_of(error.code), .detail = error.message};
   problem.limit = error.limit;
   problem.actual = error.actual;
   if (!error.field.empty()) {
@@ -175,13 +164,13 @@ Problem to_problem(const Error& error) {
 }
 
 Problem to_problem(const JsonErrors& errors) {
-  Problem problem{.type = kInvalidRequest, .detail = errors.summary()};
+  Problem problem{.kind = kInvalidValue, .detail = errors.summary()};
   switch (errors.kind) {
     case JsonErrorKind::kMalformed:
-      problem.type = kMalformedJson;
+      problem.kind = kMalformedJson;
       break;
     case JsonErrorKind::kTooLarge:
-      problem.type = kBodyTooLarge;
+      problem.kind = kBodyTooLarge;
       break;
     case JsonErrorKind::kInvalid:
       problem.errors = errors.faults;
@@ -193,7 +182,7 @@ Problem to_problem(const JsonErrors& errors) {
 }
 
 JsonDocument to_json(const Problem& problem) {
-  const ProblemInfo& info = problem_info(problem.type);
+  const ProblemInfo& info = problem_info(problem.kind);
   JsonDocument document{{"type", "/problems/" + std::string(info.slug)},
                         {"title", info.title},
                         {"status", info.status},

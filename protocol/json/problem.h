@@ -14,51 +14,48 @@
 
 namespace pointwright::protocol {
 
-enum class ProblemType {
+enum class ProblemKind {
   kMalformedRequest,
   kMalformedJson,
   kEmptyBody,
-  kForbiddenHost,
-  kForbiddenOrigin,
-  kUnknownRoute,
-  kUnknownCloud,
-  kUnknownSession,
-  kUnknownEdit,
+  kInvalidValue,
+  kHostNotAllowed,
+  kOriginNotAllowed,
+  kNotFound,
   kMethodNotAllowed,
   kNotAcceptable,
   kRequestTimeout,
+  kWrongState,
   kCloudInUse,
-  kSessionNotReady,
-  kSessionFailed,
   kLengthRequired,
   kStaleRevision,
   kBodyTooLarge,
-  kUriTooLong,
+  kPathTooLong,
   kUnsupportedMediaType,
-  kUnsupportedFormat,
-  kInvalidRequest,
-  kInvalidValue,
-  kMalformedData,
-  kNonFinite,
-  kOutOfRange,
-  kTooLarge,
-  kEmptyCloud,
-  kEmptyRegion,
-  kRegionsIntersect,
-  kDecoderLimit,
-  kPreconditionRequired,
-  kTooManyRequests,
-  kHeadersTooLarge,
+  kRangeNotSatisfiable,
+  kExpectationFailed,
+  kRevisionRequired,
+  kTooMany,
+  kHeadTooLarge,
   kInternalError,
   kNotImplemented,
   kOverloaded,
+  kHttpVersion,
+  kOutOfSpace,
+  kMalformedCloud,
+  kUnsupportedFormat,
+  kNonFinite,
+  kOutOfRange,
+  kTooManySamples,
+  kEmptyCloud,
+  kEmptyRegion,
+  kRegionsIntersect,
   kCancelled,
-  kShuttingDown,
 };
 
 /// One row of the table.
 struct ProblemInfo {
-  ProblemType type;
+  ProblemKind kind;
   int status;                    ///< of the HTTP response
   std::string_view slug;         ///< "type" is "/problems/<slug>"; stable for ever
   std::string_view title;        ///< a short phrase
@@ -66,17 +63,17 @@ struct ProblemInfo {
   bool retryable;                ///< the same request may succeed later: send Retry-After
 };
 
-const ProblemInfo& problem_info(ProblemType type);
+const ProblemInfo& problem_info(ProblemKind kind);
 /// The whole table, in the order of the enumeration.
 std::span<const ProblemInfo> all_problems();
 /// Null where no problem has that slug.
 const ProblemInfo* find_problem(std::string_view slug);
 
 /// The problem that a failure of the engine is to a client. Exhaustive over ErrorCode.
-ProblemType problem_of(ErrorCode code);
+ProblemKind problem_of(ErrorCode code);
 
 struct Problem {
-  ProblemType type = ProblemType::kInternalError;
+  ProblemKind kind = ProblemKind::kInternalError;
   std::string detail;         ///< this occurrence, in one sentence, with values and limits
   std::string instance = {};  ///< the path of the request
   std::string request_id = {};
@@ -85,7 +82,7 @@ struct Problem {
   std::optional<double> actual = std::nullopt;
   std::optional<std::uint64_t> revision = std::nullopt;  ///< kStaleRevision: the current one
 
-  [[nodiscard]] int status() const { return problem_info(type).status; }
+  [[nodiscard]] int status() const { return problem_info(kind).status; }
 };
 
 /// The problem of an engine error: detail, limits, and the field as a pointer.
