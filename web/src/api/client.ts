@@ -1,0 +1,152 @@
+import { ApiError, networkProblem, problemFromBody } from "./problem";
+import type {
+  CloudDocument,
+  EditBody,
+  EditRecord,
+  ExportFormat,
+  History,
+  RegionName,
+  RegionOperation,
+  ServiceInfo,
+  SessionDocument,
+  SessionSummary,
+} from "./types";
+
+export type Fetch = (input: string, init?: RequestInit) => Promise<Response>;
+
+export const STREAM_ATTRIBUTES = "normal,t,detail,color,marks";
+
+/** Seconds as `Retry-After` gives them; undefined where it gives none. */
+function retryAfter(response: Response): number | undefined {
+  const seconds = Number(response.headers.get("Retry-After") ?? Number.NaN);
+  return Number.isFinite(seconds) ? seconds : undefined;
+}
+
+/**
+ * The HTTP contract, one method a route. Every method throws ApiError where the server refuses or cannot be reached, and
+ * nothing is tried again behind the caller's back.
+ */
+export class ApiClient {
+  private readonly base_: string;
+  private readonly fetch_: Fetch;
+
+  /** `base` is the directory that the viewer was served from, with its slash. */
+  constructor(base: string, fetch: Fetch = (input, init) => globalThis.fetch(input, init)) {
+    this.base_ = base.endsWith("/") ? base : `${base}/`;
+    this.fetch_ = fetch;
+  }
+
+  url(path: string): string {
+    return this.base_ + path;
+  }
+
+  async request(path: string, init: RequestInit = {}): Promise<Response> {
+    let response: Response;
+    try {
+      response = await this.fetch_(this.url(path), { cache: "no-store", ...init });
+    } catch (error) {
+      if (error instanceof DOMException && error.name === "AbortError") throw error;
+      throw new ApiError(networkProblem(error instanceof Error ? error.message : String(error)));
+    }
+    if (response.ok) return response;
+    const text = await response.text().catch(() => "");
+    throw new ApiError(problemFromBody(response.status, response.statusText, text), retryAfter(response));
+  }
+
+  private async json<Body>(path: string, init?: RequestInit): Promise<Body> {
+    return (await (await this.request(path, init)).json()) as Body;
+  }
+
+  private send<Body>(method: string, path: string, body: unknown, headers = {}): Promise<Body> {
+    return this.json<Body>(path, {
+      method,
+      headers: { "Content-Type": "application/json", ...headers },
+      body: JSON.stringify(body),
+    });
+  }
+
+  info(): Promise<ServiceInfo> {
+    return this.json("v1/info");
+  }
+
+  async clouds(): Promise<CloudDocument[]> {
+    return (await this.json<{ clouds: CloudDocument[] }>("v1/clouds")).clouds;
+  }
+
+  async deleteCloud(id: string): Promise<void> {
+    await this.request(`v1/clouds/${id}`, { method: "DELETE" });
+  }
+
+  async sessions(): Promise<SessionSummary[]> {
+    return (await this.json<{ sessions: SessionSummary[] }>("v1/sessions")).sessions;
+  }
+
+  session(id: string): Promise<SessionDocument> {
+    return this.json(`v1/sessions/${id}`);
+  }
+
+  createSession(cloud: string, options: { name?: string; scale?: number } = {}): Promise<SessionDocument> {
+    const body: Record<string, unknown> = { cloud };
+    if (options.name !== undefined) body["name"] = options.name;
+    if (options.scale !== undefined) body["scales"] = [options.scale];
+    return this.send("POST", "v1/sessions", body);
+  }
+
+  async deleteSession(id: string): Promise<void> {
+    await this.request(`v1/sessions/${id}`, { method: "DELETE" });
+  }
+
+  async regionOperations(id: string, region: RegionName): Promise<RegionOperation[]> {
+    return (await this.json<{ operations: RegionOperation[] }>(`v1/sessions/${id}/regions/${region}`)).operations;
+  }
+
+  addOperation(id: string, region: RegionName, operation: RegionOperation): Promise<SessionDocument & { changed: number }> {
+    return this.send("POST", `v1/sessions/${id}/regions/${region}/operations`, operation);
+  }
+
+  putOperations(id: string, region: RegionName, operations: RegionOperation[]): Promise<SessionDocument> {
+    return this.send("PUT", `v1/sessions/${id}/regions/${region}`, { operations });
+  }
+
+  clearRegion(id: string, region: RegionName): Promise<SessionDocument> {
+    return this.json(`v1/sessions/${id}/regions/${region}`, { method: "DELETE" });
+  }
+
+  async putPreview(id: string, edit: EditBody, sequence: number): Promise<void> {
+    await this.request(`v1/sessions/${id}/preview`, {
+      method: "PUT",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify({ ...edit, sequence }),
+    });
+  }
+
+  async endPreview(id: string): Promise<void> {
+    await this.request(`v1/sessions/${id}/preview`, { method: "DELETE" });
+  }
+
+  /** Records an edit on top of `revision`; 412 where the session has moved on. */
+  commitEdit(id: string, edit: EditBody, revision: number): Promise<EditRecord> {
+    return this.send("POST", `v1/sessions/${id}/edits`, edit, { "If-Match": `"r${revision}"` });
+  }
+
+  history(id: string): Promise<History> {
+    return this.json(`v1/sessions/${id}/edits`);
+  }
+
+  putHead(id: string, edit: number): Promise<SessionDocument> {
+    return this.send("PUT", `v1/sessions/${id}/head`, { edit });
+  }
+
+  exportUrl(id: string, format: ExportFormat): string {
+    return this.url(`v1/sessions/${id}/samples?format=${format}`);
+  }
+
+  /** One key frame of a level, as bytes. */
+  frame(id: string, level: number, signal: AbortSignal): Promise<Response> {
+    return this.request(`v1/sessions/${id}/samples?format=frame&level=${level}&attributes=${STREAM_ATTRIBUTES}`, { signal });
+  }
+
+  stream(id: string, signal: AbortSignal): Promise<Response> {
+    return this.request(`v1/sessions/${id}/stream?attributes=${STREAM_ATTRIBUTES}`, { signal });
+  }
+}

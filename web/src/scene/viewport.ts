@@ -1,0 +1,255 @@
+import { Scene, Vector3, WebGLRenderer } from "three";
+import type { Deformation } from "../api/types";
+import { normalise, type Vec3 } from "../math/vec3";
+import { CameraRig } from "./camera-rig";
+import { DEFAULT_DISPLAY, type DisplaySettings } from "./display";
+import { prefixWithin } from "./layers";
+import { Passes } from "./passes";
+import { Pacer } from "./pacer";
+import { type Hit, Picker } from "./picker";
+import { SampleSurface, type SurfaceBlock, type SurfaceLayout } from "./sample-surface";
+import { type RegionCentres, regionCentres } from "./region-centres";
+import { StrokeMask } from "./stroke-mask";
+
+/** Pixels that the targets hold at most; beyond, the picture is drawn at a lower ratio and scaled up. */
+const MAX_PIXELS = 8_500_000;
+
+export interface BrushRing {
+  position: Vec3;
+  radius: number;
+  color: readonly [number, number, number];
+}
+
+/** The picture: owns the canvas, the samples on the GPU and the loop that draws them when something has changed. */
+export class Viewport {
+  readonly canvas: HTMLCanvasElement;
+  readonly rig: CameraRig;
+  /** Drawn over the picture: the gizmo. */
+  readonly overlay = new Scene();
+  readonly mask: StrokeMask;
+  /** After each picture; for the status line and the tests. */
+  onDrawn: (() => void) | null = null;
+  onContext: ((lost: boolean) => void) | null = null;
+
+  private readonly container_: HTMLElement;
+  private readonly renderer_: WebGLRenderer;
+  private readonly passes_: Passes;
+  private readonly picker_: Picker;
+  private readonly pacer_ = new Pacer();
+  private readonly observer_: ResizeObserver;
+  private surface_: SampleSurface | null = null;
+  private display_: DisplaySettings = DEFAULT_DISPLAY;
+  private spacing_ = 0;
+  private fullSamples_ = 0;
+  private frame_ = 0;
+  private timer_ = 0;
+  private contextLost_ = false;
+
+  constructor(container: HTMLElement) {
+    this.container_ = container;
+    this.renderer_ = new WebGLRenderer({ antialias: true, alpha: false, powerPreference: "high-performance" });
+    this.renderer_.autoClear = false;
+    this.canvas = this.renderer_.domElement;
+    this.canvas.className = "viewport-canvas";
+    this.canvas.tabIndex = 0;
+    this.canvas.setAttribute("role", "application");
+    this.canvas.setAttribute("aria-label", "View of the surface. Arrow keys turn it, plus and minus zoom, F frames it.");
+    container.append(this.canvas);
+    const gl = this.gl;
+    if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("This browser's WebGL 2 cannot draw into float textures.");
+    this.passes_ = new Passes(this.renderer_);
+    this.passes_.set(this.passes_.splat, "maxPointSize", (gl.getParameter(gl.ALIASED_POINT_SIZE_RANGE) as Float32Array)[1] ?? 64);
+    this.rig = new CameraRig(this.canvas, () => this.invalidate());
+    this.picker_ = new Picker(this.renderer_, this.passes_.surfaceTarget, this.passes_.attributeTarget);
+    this.mask = new StrokeMask(this.passes_, () => this.invalidateOverlay());
+    this.passes_.setDisplay(this.display_);
+    this.canvas.addEventListener("webglcontextlost", this.contextLost);
+    this.canvas.addEventListener("webglcontextrestored", this.contextRestored);
+    this.observer_ = new ResizeObserver(() => this.resize());
+    this.observer_.observe(container);
+    this.resize();
+  }
+
+  get gl(): WebGL2RenderingContext {
+    return this.renderer_.getContext() as WebGL2RenderingContext;
+  }
+
+  /** Nothing waits to be drawn or refined. */
+  get idle(): boolean {
+    return !this.contextLost_ && this.frame_ === 0 && this.timer_ === 0 && this.pacer_.settled;
+  }
+
+  get loadedSamples(): number {
+    return this.surface_?.loadedSamples ?? 0;
+  }
+
+  get display(): DisplaySettings {
+    return this.display_;
+  }
+
+  setDisplay(display: DisplaySettings): void {
+    this.display_ = display;
+    this.passes_.setDisplay(display);
+    this.invalidate();
+  }
+
+  /** Median distance between neighbouring samples of the whole cloud, for the splats' size. */
+  setSpacing(spacing: number, fullSamples: number): void {
+    this.spacing_ = spacing;
+    this.fullSamples_ = fullSamples;
+    this.invalidate();
+  }
+
+  /** Makes room for a frame's blocks, or keeps the buffers where they fit. */
+  beginFrame(layout: SurfaceLayout, key: boolean): void {
+    if (this.surface_ && this.surface_.fits(layout)) return;
+    if (!key) return;
+    this.surface_?.dispose();
+    this.surface_ = new SampleSurface(this.gl, layout);
+    this.passes_.setSurface(this.surface_);
+  }
+
+  /** Uploads one block; false where there is no surface that it belongs to. */
+  putBlock(block: SurfaceBlock): boolean {
+    if (!this.surface_ || this.contextLost_) return false;
+    this.surface_.put(block);
+    this.invalidate();
+    return true;
+  }
+
+  setBounds(center: Vec3, radius: number, stretchRange: number): void {
+    this.rig.setBounds(center, radius);
+    this.passes_.set(this.passes_.shade, "objectRadius", Math.max(radius, 1e-12));
+    this.passes_.set(this.passes_.splat, "stretchRange", stretchRange);
+  }
+
+  clearSurface(): void {
+    this.surface_?.dispose();
+    this.surface_ = null;
+    this.invalidate();
+  }
+
+  /** The deformation that the picture adds to the server's last frame, in scene coordinates. */
+  setResidual(deformation: Deformation | null): void {
+    const { splat } = this.passes_;
+    const kind = deformation ? (deformation.type === "translation" ? 1 : 2) : 0;
+    if (kind === 0 && splat["residualKind"]?.value === 0) return;
+    this.passes_.set(splat, "residualKind", kind);
+    if (deformation?.type === "translation") {
+      (splat["residualVector"]?.value as Vector3).set(...deformation.vector);
+    } else if (deformation) {
+      (splat["residualVector"]?.value as Vector3).set(...normalise(deformation.axis.direction));
+      (splat["residualPoint"]?.value as Vector3).set(...deformation.axis.point);
+      this.passes_.set(splat, "residualAngle", (deformation.angle_deg * Math.PI) / 180);
+    }
+    this.invalidate();
+  }
+
+  setRing(ring: BrushRing | null): void {
+    const { present } = this.passes_;
+    if (!ring && !present["showRing"]?.value) return;
+    this.passes_.set(present, "showRing", ring !== null);
+    if (ring) {
+      (present["ringCenter"]?.value as Vector3).copy(this.picker_.toView(ring.position));
+      this.passes_.set(present, "ringRadius", ring.radius);
+      (present["ringColor"]?.value as Vector3).set(...ring.color);
+    }
+    this.invalidateOverlay();
+  }
+
+  /** What lies under a point of the page. */
+  pick(clientX: number, clientY: number): Hit | null {
+    const box = this.canvas.getBoundingClientRect();
+    return this.picker_.pick((clientX - box.left) / box.width, (clientY - box.top) / box.height);
+  }
+
+  regionCentres(): RegionCentres {
+    if (!this.surface_) return { zero: null, one: null, boundary: null };
+    const { blockSize, blockCount } = this.surface_.layout;
+    return regionCentres({ ...this.surface_.readBack(), blockSize, blockCount });
+  }
+
+  /** Something of the picture has changed. */
+  invalidate(): void {
+    this.pacer_.change();
+    this.schedule();
+  }
+
+  /** Only what is laid over has changed. */
+  invalidateOverlay(): void {
+    this.schedule();
+  }
+
+  dispose(): void {
+    cancelAnimationFrame(this.frame_);
+    clearTimeout(this.timer_);
+    this.observer_.disconnect();
+    this.rig.dispose();
+    this.surface_?.dispose();
+    this.renderer_.dispose();
+    this.canvas.remove();
+  }
+
+  private schedule(): void {
+    if (this.frame_ === 0 && !this.contextLost_) this.frame_ = requestAnimationFrame(this.tick);
+  }
+
+  private readonly tick = (now: number): void => {
+    this.frame_ = 0;
+    clearTimeout(this.timer_);
+    this.timer_ = 0;
+    if (this.rig.update()) this.pacer_.change();
+    const step = this.pacer_.next(now, this.surface_?.layout.sampleCount ?? 0);
+    if (step.kind !== "none") this.drawPicture(step.budget, step.index, step.jitter);
+    this.passes_.drawPresent(this.rig.camera);
+    this.renderer_.render(this.overlay, this.rig.camera);
+    this.onDrawn?.();
+    const wait = this.pacer_.wait(performance.now());
+    if (wait === 0) this.schedule();
+    else if (wait !== null) this.timer_ = window.setTimeout(() => { this.timer_ = 0; this.schedule(); }, wait);
+  };
+
+  private drawPicture(budget: number, index: number, jitter: readonly [number, number]): void {
+    const { camera } = this.rig;
+    const { x: width, y: height } = this.passes_.viewport;
+    const { splat, shade } = this.passes_;
+    const surface = this.surface_;
+    const prefix = surface ? prefixWithin(surface.prefixes, budget) : { blocks: 0, samples: 0 };
+    // Fewer samples stand wider apart: their discs grow so that the surface stays closed.
+    const shown = surface ? Math.max(1, Math.min(prefix.samples, Math.max(surface.loadedSamples, 1))) : 1;
+    const sparse = Math.sqrt(Math.max(1, this.fullSamples_) / shown);
+    this.passes_.set(splat, "splatRadius", this.spacing_ * 1.05 * Math.max(1, sparse) * this.display_.splatSize);
+    this.passes_.set(shade, "turn", index * 0.61);
+    camera.setViewOffset(width, height, jitter[0], jitter[1], width, height);
+    this.passes_.set(splat, "pixelScale", height * 0.5 * camera.projectionMatrix.elements[5]);
+    this.passes_.drawPicture(camera, prefix.blocks * (surface?.layout.blockSize ?? 0), 1 / (index + 1));
+    camera.clearViewOffset();
+    this.picker_.setCamera(camera);
+    if (index === 0) this.mask.redraw(camera);
+  }
+
+  private resize(): void {
+    const width = Math.max(1, this.container_.clientWidth);
+    const height = Math.max(1, this.container_.clientHeight);
+    const wanted = Math.min(2, window.devicePixelRatio);
+    const ratio = Math.min(wanted, Math.sqrt(MAX_PIXELS / (width * height)));
+    this.renderer_.setPixelRatio(ratio);
+    this.renderer_.setSize(width, height);
+    this.passes_.setSize(this.canvas.width, this.canvas.height, ratio);
+    this.rig.setAspect(width / height);
+    this.invalidate();
+  }
+
+  private readonly contextLost = (event: Event): void => {
+    event.preventDefault();
+    this.contextLost_ = true;
+    this.surface_ = null;
+    this.onContext?.(true);
+  };
+
+  private readonly contextRestored = (): void => {
+    this.contextLost_ = false;
+    this.invalidate();
+    this.onContext?.(false);
+  };
+}
