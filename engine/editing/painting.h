@@ -27,10 +27,11 @@ enum class PaintMode {
 struct PaintOperation {
   PaintMode mode = PaintMode::kAdd;
   Shape shape;
-  /// Only samples whose normal has a positive component along this direction (toward the viewer): a brush that does
-  /// not paint through thin sheets. Off where not given.
+  /// Only samples whose normal has a positive component along this direction (toward the viewer): a brush
+  /// that does not paint through thin sheets. Off where not given.
   std::optional<Vec3d> facing;
-  /// Samples that join this region leave the other one. Without it they end up in both, which an edit refuses.
+  /// Samples that join this region leave the other one. Without it they end up in both, which an edit
+  /// refuses.
   bool steal = false;
 };
 
@@ -38,11 +39,11 @@ struct PaintOperation {
 Result<void> validate(const PaintOperation& operation);
 
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
-/// Shapes:      positions relative to `origin`; normals of the same surface (read only where `facing` is given)
-/// Cost:        O(N) with an early bounding-box test per block; parallel
-/// Determinism: bitwise equal for any thread count
-std::size_t paint(const PaintOperation& operation, RegionKind kind, const Points& position, const Points& normal,
-                  const Vec3d& origin, Marks& marks);
+/// Shapes:      positions relative to `origin`; normals of the same surface (read only where `facing` is
+/// given) Cost:        O(N) with an early bounding-box test per block; parallel Determinism: bitwise equal
+/// for any thread count
+std::size_t paint(const PaintOperation& operation, RegionKind kind, const Points& position,
+                  const Points& normal, const Vec3d& origin, Marks& marks);
 
 /// Samples painted with `kind`. Cost: O(N).
 std::size_t count_marked(const Marks& marks, RegionKind kind);

@@ -1,8 +1,8 @@
 #pragma once
-// Analytic shapes in model space: what a painting operation covers (§4: "drawing of points, lines, circles and other
-// primitives").
+// Analytic shapes in model space: what a painting operation covers (§4: "drawing of points, lines, circles
+// and other primitives").
 
-#include <optional>
+#include <cstddef>
 #include <variant>
 #include <vector>
 
@@ -10,6 +10,12 @@
 #include "engine/core/vector.h"
 
 namespace pointwright {
+
+/// Limits of what a shape may hold.
+inline constexpr double kMaxShapeCoordinate = 1e12;
+inline constexpr std::size_t kMaxStrokeVertices = 100'000;
+/// Directions with no component as large as this are "zero".
+inline constexpr double kMinDirectionLength = 1e-100;
 
 /// All points within `radius` of `center`.
 struct Sphere {
@@ -36,11 +42,17 @@ struct Everything {};
 
 using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything>;
 
-/// Finite members, radii > 0, min <= max, a normal that is not zero, at least one and at most 100,000 vertices.
-/// Errors: kInvalidArgument (field "shape.radius" and the like), kNonFinite.
+/// Finite members within kMaxShapeCoordinate, radii > 0, min <= max, a normal that is not zero, at least one
+/// and at most kMaxStrokeVertices vertices. Errors: kInvalidArgument (field "shape.radius" and the like),
+/// kNonFinite, kOutOfRange, kTooLarge (vertices).
 Result<void> validate(const Shape& shape);
 
 /// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for a stroke.
 bool contains(const Shape& shape, const Vec3d& point);
+
+/// Whether the point lies within the stroke's radius of its segment `segment` (from that vertex to the next;
+/// a stroke of one vertex has one segment, the vertex itself). A stroke contains what any of its segments
+/// contains.
+bool stroke_segment_contains(const Stroke& stroke, std::size_t segment, const Vec3d& point);
 
 }  // namespace pointwright

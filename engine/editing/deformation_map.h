@@ -1,0 +1,13 @@
+#pragma once
+// A deformation prepared for the vectorised kernels.
+
+#include "engine/editing/deformation.h"
+#include "engine/editing/deformation_kernels.h"
+
+namespace pointwright {
+
+/// Rotations are taken about the point of their axis that lies nearest to `origin`, and whole quarter turns
+/// are split off in double precision. Pre: a valid deformation.
+DeformMap to_deform_map(const Deformation& deformation, const Vec3d& origin);
+
+}  // namespace pointwright

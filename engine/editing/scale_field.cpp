@@ -1,0 +1,71 @@
+#include "engine/editing/scale_field.h"
+
+#include <algorithm>
+
+#include "engine/core/check.h"
+#include "engine/core/parallel.h"
+#include "engine/editing/scale_field_kernels.h"
+
+namespace pointwright {
+
+float blend_value(Blend blend, float x) {
+  switch (blend) {
+    case Blend::kQuartic: {
+      const float root = (1.0F - x) * (1.0F + x);
+      return root * root;
+    }
+  }
+  POINTWRIGHT_CHECK(false, "a known blend");
+}
+
+float blend_slope(Blend blend, float x) {
+  switch (blend) {
+    case Blend::kQuartic:
+      return -4.0F * x * (1.0F - x) * (1.0F + x);
+  }
+  POINTWRIGHT_CHECK(false, "a known blend");
+}
+
+namespace {
+
+DistanceColumns columns_of(const RegionDistances& distances) {
+  return {.distance = distances.distance.data(),
+          .gradient_x = distances.gradient.x(),
+          .gradient_y = distances.gradient.y(),
+          .gradient_z = distances.gradient.z()};
+}
+
+}  // namespace
+
+ScaleField compute_scale_field(const Points& position, const RegionPair& regions, Blend blend,
+                               const ExecutionContext* context) {
+  POINTWRIGHT_CHECK(!regions.zero.empty() && !regions.one.empty(), "both regions hold a ball");
+  POINTWRIGHT_CHECK(blend == Blend::kQuartic, "a known blend");
+  const std::size_t n = position.size();
+  ScaleField field{.t = std::vector<float>(padded_to_block(n)), .gradient = Points(n)};
+  const auto blend_block = POINTWRIGHT_KERNEL(blend_quartic);
+  parallel_for(
+      n,
+      [&](std::size_t begin, std::size_t end) {
+        RegionDistances zero;
+        RegionDistances one;
+        regions.zero.distances(position, begin, end, zero);
+        regions.one.distances(position, begin, end, one);
+        blend_block(ScaleBlend{.zero = columns_of(zero),
+                               .one = columns_of(one),
+                               .t = field.t.data() + begin,
+                               .gradient_x = field.gradient.x() + begin,
+                               .gradient_y = field.gradient.y() + begin,
+                               .gradient_z = field.gradient.z() + begin},
+                    padded_to_block(end - begin));
+      },
+      kParallelBlock, context);
+  // The padding belongs to no sample: it stays put.
+  for (std::size_t i = n; i < field.t.size(); ++i) {
+    field.t[i] = 0.0F;
+    for (float* column : {field.gradient.x(), field.gradient.y(), field.gradient.z()}) column[i] = 0.0F;
+  }
+  return field;
+}
+
+}  // namespace pointwright
