@@ -1,0 +1,55 @@
+// Draco bytes to a ready hierarchy, one band: what opening a session costs.
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <unistd.h>
+
+#include "engine/io/cloud_io.h"
+#include "engine/multires/hierarchy.h"
+#include "tests/bench/benchmarks.h"
+#include "tests/bench/synthetic_scan.h"
+
+namespace pointwright::bench {
+namespace {
+
+double resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  double total = 0.0;
+  double resident = 0.0;
+  statm >> total >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+void bench_scan(BenchReport& report, const std::string& label, std::size_t n) {
+  const std::string decode = "draco.decode." + label;
+  const std::string session = "session." + label + ".1band";
+  if (!report.wants(decode) && !report.wants(session)) return;
+  auto encoded = write_cloud(ordered_scan(n), CloudFormat::kDraco, ExportParams{.draco_position_bits = 14});
+  if (!encoded) std::abort();
+  const ImportParams params{};
+  report.time(decode, "ms", static_cast<double>(n), [&] {
+    if (!read_cloud(encoded.value(), CloudFormat::kDraco, params)) std::abort();
+  });
+  const auto open = [&] {
+    auto imported = read_cloud(encoded.value(), CloudFormat::kDraco, params);
+    if (!imported) std::abort();
+    auto hierarchy = build_hierarchy(imported.value().cloud, HierarchyParams{}, ExecutionContext{});
+    if (!hierarchy) std::abort();
+    return std::pair(std::move(imported).value(), std::move(hierarchy).value());
+  };
+  report.time(session, "ms", static_cast<double>(n), [&] { open(); });
+  const double before = resident_bytes();
+  const auto kept = open();
+  report.add(session + ".bytes_per_sample", "B", static_cast<double>(n),
+             (resident_bytes() - before) / static_cast<double>(n));
+}
+
+}  // namespace
+
+void bench_session(BenchReport& report) {
+  bench_scan(report, "150k", 150'000);
+  bench_scan(report, "2m", 2'000'000);
+}
+
+}  // namespace pointwright::bench

@@ -1,0 +1,13 @@
+#pragma once
+// Every area's benchmarks; main.cpp runs them all.
+
+#include "tests/bench/bench.h"
+
+namespace pointwright::bench {
+
+void bench_multires(BenchReport& report);
+void bench_editing(BenchReport& report);
+void bench_frames(BenchReport& report);
+void bench_session(BenchReport& report);
+
+}  // namespace pointwright::bench

@@ -1,0 +1,37 @@
+// pointwright_bench [--out FILE] [--threads N] [FILTER]: runs the benchmarks whose name contains FILTER.
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "engine/core/parallel.h"
+#include "tests/bench/benchmarks.h"
+
+int main(int argc, char** argv) {
+  std::string out = "build/bench.json";
+  std::string filter;
+  int threads = 0;
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--out") == 0 && i + 1 < argc) {
+      out = argv[++i];
+    } else if (std::strcmp(argv[i], "--threads") == 0 && i + 1 < argc) {
+      threads = std::atoi(argv[++i]);
+    } else if (argv[i][0] == '-') {
+      std::fprintf(stderr, "usage: pointwright_bench [--out FILE] [--threads N] [FILTER]\n");
+      return 2;
+    } else {
+      filter = argv[i];
+    }
+  }
+  pointwright::bench::BenchReport report(filter);
+  pointwright::with_threads(threads, [&] {
+    pointwright::bench::bench_multires(report);
+    pointwright::bench::bench_frames(report);
+    pointwright::bench::bench_session(report);
+  });
+  if (!report.write_json(out)) {
+    std::fprintf(stderr, "cannot write %s\n", out.c_str());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,18 @@
+#pragma once
+// Synthetic scans of any size: deterministic, with detail at several scales, in random order like a scanner's merge.
+
+#include <cstddef>
+#include <cstdint>
+
+#include "engine/core/cloud.h"
+
+namespace pointwright::bench {
+
+/// N samples of a torus (radii 1 and 0.4) with bumps of three wavelengths, sampled evenly by area with random
+/// positions, in random order. The same bytes on every machine. Pre: n <= 2^32 - 1. Cost: O(N).
+Cloud synthetic_scan(std::size_t n, std::uint64_t seed = 1);
+
+/// The scan as an importer leaves it: in coherent order.
+Cloud ordered_scan(std::size_t n);
+
+}  // namespace pointwright::bench
