@@ -4,7 +4,22 @@
 //
 // A lane is {name, about, run}; run() answers {passed, failed, output}: how many test cases passed and failed, and what to
 // show when some failed. A gate counts as one test. Exit status: 0 only where something ran and nothing failed.
+import { mkdirSync, writeFileSync } from "node:fs";
+import { resolve } from "node:path";
 import { lanes } from "./lanes.mjs";
+import { root } from "./support/process.mjs";
+
+const shownLines = 300;
+const logs = resolve(root, "build/checks/logs");
+
+/** Failing output, cut where it would bury the rest; the whole stands in its log. */
+function show(output, log) {
+  const lines = output.trimEnd().split("\n");
+  if (lines.length <= shownLines) return console.log(lines.join("\n"));
+  console.log(lines.slice(0, shownLines / 3).join("\n"));
+  console.log(`    ... ${lines.length - shownLines} lines left out; all of them: ${log}`);
+  console.log(lines.slice(-(2 * shownLines) / 3).join("\n"));
+}
 
 const wanted = process.argv.slice(2);
 if (wanted.includes("--list")) {
@@ -17,6 +32,7 @@ if (unknown.length > 0) {
   process.exit(2);
 }
 
+mkdirSync(logs, { recursive: true });
 const results = [];
 for (const lane of lanes.filter(({ name }) => wanted.length === 0 || wanted.includes(name))) {
   console.log(`--- ${lane.name}: ${lane.about}`);
@@ -28,7 +44,9 @@ for (const lane of lanes.filter(({ name }) => wanted.length === 0 || wanted.incl
     result = { passed: 0, failed: 1, output: String(error?.stack ?? error) };
   }
   const seconds = (Date.now() - start) / 1000;
-  if (result.failed > 0) console.log(result.output.trimEnd());
+  const log = resolve(logs, `${lane.name}.log`);
+  writeFileSync(log, result.output);
+  if (result.failed > 0) show(result.output, log);
   console.log(`    ${result.failed > 0 ? "FAILED" : "ok"} in ${seconds.toFixed(1)} s`);
   results.push({ name: lane.name, seconds, ...result });
 }
