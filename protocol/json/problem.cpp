@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "protocol/json/documents.h"
-
 namespace pointwright::protocol {
 namespace {
 
@@ -108,7 +106,7 @@ constexpr std::array kProblems{
 JsonDocument number_document(double value) {
   constexpr double kExact = 9007199254740992.0;  // 2^53
   if (std::abs(value) < kExact && value == std::floor(value)) return static_cast<std::int64_t>(value);
-  return checked_number(value);
+  return value;
 }
 
 }  // namespace
@@ -196,8 +194,8 @@ JsonDocument to_json(const Problem& problem) {
     }
     document["errors"] = std::move(errors);
   }
-  if (problem.limit) document["limit"] = number_document(*problem.limit);
-  if (problem.actual) document["actual"] = number_document(*problem.actual);
+  if (problem.limit && std::isfinite(*problem.limit)) document["limit"] = number_document(*problem.limit);
+  if (problem.actual && std::isfinite(*problem.actual)) document["actual"] = number_document(*problem.actual);
   if (problem.revision) document["revision"] = *problem.revision;
   return document;
 }
