@@ -1,0 +1,226 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numeric>
+
+#include "engine/io/decoded_cloud.h"
+#include "engine/spatial/coherent_order.h"
+
+namespace pointwright {
+namespace {
+
+constexpr double kLargestCoordinate = 1e9;
+constexpr double kLeastExtentFloat = 1e-5;    // of the largest coordinate: some 170 steps of a float32
+constexpr double kLeastExtentDouble = 1e-12;  // some 4500 steps of a float64
+constexpr double kNearZero = 8.0;             // extents
+
+using Position = std::array<double, 3>;
+
+// The position as the file has it. A negative zero at origin 0 stays one.
+Position file_position(const Cloud& cloud, std::size_t i) {
+  if (!cloud.exact_position.empty()) return cloud.exact_position[i];
+  const std::array<float, 3> p{cloud.position.x()[i], cloud.position.y()[i], cloud.position.z()[i]};
+  Position result{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double origin = cloud.origin[static_cast<Eigen::Index>(axis)];
+    result[axis] = origin == 0.0 ? static_cast<double>(p[axis]) : origin + static_cast<double>(p[axis]);
+  }
+  return result;
+}
+
+bool is_finite(const Position& p) {
+  return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+}
+
+Result<void> drop_or_refuse_non_finite(ImportedCloud& imported, const ImportParams& params) {
+  Cloud& cloud = imported.cloud;
+  std::vector<std::uint32_t> finite;
+  std::size_t first_bad = cloud.size();
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const bool good = is_finite(file_position(cloud, i));
+    if (!good && first_bad == cloud.size()) {
+      first_bad = i;
+      finite.resize(i);
+      std::iota(finite.begin(), finite.end(), 0U);
+    } else if (good && first_bad < cloud.size()) {
+      finite.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  if (first_bad == cloud.size()) return {};
+  const std::size_t count = cloud.size() - finite.size();
+  if (!params.drop_non_finite) {
+    return Error{.code = ErrorCode::kNonFinite,
+                 .message = std::to_string(count) + " of " + std::to_string(cloud.size()) +
+                            " samples have a coordinate that is not finite; the first is sample " +
+                            std::to_string(first_bad),
+                 .field = "position",
+                 .limit = 0.0,
+                 .actual = static_cast<double>(count)};
+  }
+  if (finite.empty()) {
+    return Error{
+        .code = ErrorCode::kEmptyCloud, .message = "no sample has finite coordinates", .field = "position"};
+  }
+  cloud = permuted(cloud, finite);
+  std::iota(cloud.id.begin(), cloud.id.end(), 0U);
+  imported.report.dropped_non_finite = count;
+  return {};
+}
+
+struct Range {
+  Vec3d min = Vec3d::Constant(std::numeric_limits<double>::max());
+  Vec3d max = Vec3d::Constant(std::numeric_limits<double>::lowest());
+  [[nodiscard]] double extent() const { return (max - min).maxCoeff(); }
+  [[nodiscard]] Vec3d farthest() const { return min.cwiseAbs().cwiseMax(max.cwiseAbs()); }
+};
+
+Range range_of(const Cloud& cloud) {
+  Range range;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Position p = file_position(cloud, i);
+    const Vec3d v(p[0], p[1], p[2]);
+    range.min = range.min.cwiseMin(v);
+    range.max = range.max.cwiseMax(v);
+  }
+  return range;
+}
+
+Result<void> check_range(const Range& range, bool is_double) {
+  const double farthest = range.farthest().maxCoeff();
+  if (!(farthest <= kLargestCoordinate)) {
+    return Error{.code = ErrorCode::kOutOfRange,
+                 .message = "a coordinate reaches " + std::to_string(farthest) + "; at most 1e9 is taken",
+                 .field = "position",
+                 .limit = kLargestCoordinate,
+                 .actual = farthest};
+  }
+  const double least = farthest * (is_double ? kLeastExtentDouble : kLeastExtentFloat);
+  if (range.extent() > 0.0 && range.extent() < least) {
+    return Error{.code = ErrorCode::kOutOfRange,
+                 .message = "the samples span " + std::to_string(range.extent()) + " at coordinates up to " +
+                            std::to_string(farthest) +
+                            ": too little for their precision. Send float64 positions, or "
+                            "coordinates nearer to zero",
+                 .field = "position",
+                 .limit = least,
+                 .actual = range.extent()};
+  }
+  return {};
+}
+
+// Multiples of a power of two subtract from float32 coordinates without a rounding.
+Vec3d chosen_origin(const Range& range) {
+  const double extent = range.extent();
+  Vec3d origin = Vec3d::Zero();
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (range.farthest()[axis] <= kNearZero * extent) continue;
+    const double middle = 0.5 * (range.min[axis] + range.max[axis]);
+    // Without an extent the place itself is the origin, as a float32.
+    const double step = extent > 0.0 ? std::exp2(std::ceil(std::log2(extent)) - 3.0) : 0.0;
+    origin[axis] =
+        step > 0.0 ? std::round(middle / step) * step : static_cast<double>(static_cast<float>(middle));
+  }
+  return origin;
+}
+
+// A file's own origin is kept where the positions around it lie near zero: then float32 serves them well.
+bool keeps_origin(const Cloud& cloud, const Range& range) {
+  if (cloud.origin.isZero(0.0) || !cloud.exact_position.empty()) return false;
+  const double reach =
+      (range.max - cloud.origin).cwiseAbs().cwiseMax((range.min - cloud.origin).cwiseAbs()).maxCoeff();
+  return reach <= kNearZero * range.extent();
+}
+
+void recentre(Cloud& cloud, const Range& range) {
+  if (keeps_origin(cloud, range)) return;
+  const Vec3d origin = chosen_origin(range);
+  const bool is_plain_float = cloud.exact_position.empty() && cloud.origin.isZero(0.0);
+  if (is_plain_float && origin.isZero(0.0)) return;
+  std::vector<Position> exact(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) exact[i] = file_position(cloud, i);
+  cloud.origin = origin;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Vec3d p(exact[i][0], exact[i][1], exact[i][2]);
+    // At origin 0 the cast alone keeps a negative zero.
+    cloud.position.set(i, Vec3d((origin.array() == 0.0).select(p, p - origin)).cast<float>());
+  }
+  cloud.exact_position.clear();
+  bool is_exact = true;
+  for (std::size_t i = 0; is_exact && i < cloud.size(); ++i) {
+    const Position again = file_position(cloud, i);
+    is_exact = std::memcmp(again.data(), exact[i].data(), sizeof(Position)) == 0;
+  }
+  if (!is_exact) cloud.exact_position = std::move(exact);
+}
+
+// After coherent ordering equal float positions are adjacent; equal exact ones may be parted by others of the
+// same float.
+std::uint64_t count_duplicates(const Cloud& cloud) {
+  const auto same_place = [&](std::size_t a, std::size_t b) {
+    return cloud.position[a] == cloud.position[b];
+  };
+  std::uint64_t duplicates = 0;
+  std::vector<Position> run;
+  for (std::size_t begin = 0; begin < cloud.size();) {
+    std::size_t end = begin + 1;
+    while (end < cloud.size() && same_place(begin, end)) ++end;
+    if (end - begin > 1 && cloud.exact_position.empty()) {
+      duplicates += end - begin - 1;
+    } else if (end - begin > 1) {
+      run.assign(cloud.exact_position.begin() + static_cast<std::ptrdiff_t>(begin),
+                 cloud.exact_position.begin() + static_cast<std::ptrdiff_t>(end));
+      std::sort(run.begin(), run.end());
+      duplicates += static_cast<std::uint64_t>(run.end() - std::unique(run.begin(), run.end()));
+    }
+    begin = end;
+  }
+  return duplicates;
+}
+
+void list_attributes(ImportedCloud& imported) {
+  auto& names = imported.report.attributes;
+  names.clear();
+  if (imported.cloud.has_normals()) names.emplace_back("normal");
+  if (imported.cloud.has_colors()) names.emplace_back("color");
+  if (!imported.cloud.texcoord.empty()) names.emplace_back("texcoord");
+  for (const ScalarAttribute& scalar : imported.cloud.scalars) names.push_back(scalar.name);
+}
+
+}  // namespace
+
+Result<ImportedCloud> finish_cloud(ImportedCloud decoded, const ImportParams& params) {
+  ImportedCloud& imported = decoded;
+  Cloud& cloud = imported.cloud;
+  if (cloud.position.empty()) {
+    return Error{.code = ErrorCode::kEmptyCloud, .message = "the cloud has no samples", .field = {}};
+  }
+  if (cloud.size() > params.max_samples) {
+    return Error{.code = ErrorCode::kTooLarge,
+                 .message = "the cloud has " + std::to_string(cloud.size()) + " samples; at most " +
+                            std::to_string(params.max_samples) + " are taken",
+                 .field = "position",
+                 .limit = static_cast<double>(params.max_samples),
+                 .actual = static_cast<double>(cloud.size())};
+  }
+  if (!cloud.origin.allFinite()) {
+    return Error{
+        .code = ErrorCode::kNonFinite, .message = "the file's origin is not finite", .field = "origin"};
+  }
+  if (auto finite = drop_or_refuse_non_finite(imported, params); !finite) return finite.error();
+  const Range range = range_of(cloud);
+  const bool is_double = cloud.position_is_double || !cloud.origin.isZero(0.0);
+  if (auto checked = check_range(range, is_double); !checked) return checked.error();
+  recentre(cloud, range);
+  cloud = permuted(cloud, coherent_order(cloud.position));
+  imported.report.sample_count = cloud.size();
+  imported.report.duplicate_count = count_duplicates(cloud);
+  imported.report.position_is_double = cloud.position_is_double;
+  imported.report.bounds_min = range.min;
+  imported.report.bounds_max = range.max;
+  list_attributes(imported);
+  return decoded;
+}
+
+}  // namespace pointwright
