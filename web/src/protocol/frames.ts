@@ -132,7 +132,8 @@ function readNumber(view: DataView, offset: number, what: string): number {
   return Number(value);
 }
 
-function readHeader(view: DataView): FrameHeader {
+/** The header of a frame whose bytes may be still on their way: `view` has the frame's whole length. */
+export function readHeader(view: DataView): FrameHeader {
   refuse(view.byteLength < frameHeaderBytes, "shorter than the header");
   refuse(view.getUint32(0, true) !== 0x52465750, "another magic than PWFR");
   refuse(view.getUint16(4, true) !== frameVersion, "an unknown version");
@@ -171,7 +172,8 @@ function isFinitePositive(value: number): boolean {
   return Number.isFinite(value) && value >= 0;
 }
 
-function checkHeader(header: FrameHeader, length: number, limits: FrameLimits): void {
+/** Throws a FrameError where the header contradicts itself or the frame's length. */
+export function checkHeader(header: FrameHeader, length: number, limits: FrameLimits = defaultLimits): void {
   refuse(header.sampleCount > limits.maxSamples, `${header.sampleCount} samples, beyond the limit`);
   refuse(header.blockSize < 1 || header.blockSize > maxBlockSize, "a block size out of range");
   refuse(header.blockCount > header.sampleCount, "more blocks than samples");
@@ -188,7 +190,8 @@ function checkHeader(header: FrameHeader, length: number, limits: FrameLimits): 
   refuse(!center.every(Number.isFinite) || !isFinitePositive(radius), "bounds that are not a ball");
 }
 
-function readBlock(bytes: Uint8Array, view: DataView, offset: number, header: FrameHeader): FrameBlock {
+/** The block record at `offset`, which must have come whole. */
+export function readBlock(bytes: Uint8Array, view: DataView, offset: number, header: FrameHeader): FrameBlock {
   refuse(view.byteLength - offset < blockHeaderBytes, "a block record is cut off");
   const number = view.getUint32(offset, true);
   const count = view.getUint32(offset + 4, true);
