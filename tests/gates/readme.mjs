@@ -3,7 +3,7 @@
 import { mkdtempSync, rmSync, symlinkSync, mkdirSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { startDaemon } from "../support/daemon.mjs";
+import { startDaemon } from "../../web/demo/daemon.mjs";
 import { contentOf, root, run, verdict } from "../support/process.mjs";
 
 const marker = "<!-- checked: these lines run in the tests -->";

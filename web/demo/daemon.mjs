@@ -2,10 +2,12 @@
 import { spawn } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join, resolve } from "node:path";
-import { root } from "./process.mjs";
+import { dirname, join, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
 
-export const daemonPath = process.env.POINTWRIGHTD ?? resolve(root, "build/release/server/pointwrightd");
+const root = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
+/** The environment variable POINTWRIGHTD names another build's daemon. */
+export const daemonPath = process.env["POINTWRIGHTD"] ?? resolve(root, "build/release/server/pointwrightd");
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
 /** Starts pointwrightd and waits until it answers. Answers {url, pid, log(), stop()}; stop() resolves to the exit status. */
@@ -13,7 +15,9 @@ export async function startDaemon(args = []) {
   if (!existsSync(daemonPath)) throw new Error(`${daemonPath} is not built`);
   const folder = mkdtempSync(join(tmpdir(), "pointwright-"));
   const portFile = join(folder, "port");
-  const child = spawn(daemonPath, ["--port", "0", "--port-file", portFile, ...args], { stdio: ["ignore", "pipe", "pipe"] });
+  const child = spawn(daemonPath, ["--port", "0", "--port-file", portFile, ...args], {
+    stdio: ["ignore", "pipe", "pipe"],
+  });
   let log = "";
   let status = null;
   let startError = null;
@@ -43,12 +47,16 @@ export async function startDaemon(args = []) {
     const port = existsSync(portFile) ? Number(readFileSync(portFile, "utf8").trim()) : 0;
     if (port > 0) {
       const url = `http://127.0.0.1:${port}`;
-      const ready = await fetch(`${url}/readyz`).then((response) => response.ok, () => false);
+      const ready = await fetch(`${url}/readyz`).then(
+        (response) => response.ok,
+        () => false,
+      );
       if (ready) return { url, pid: child.pid, log: () => log, stop };
     }
     await sleep(25);
   }
-  const reason = startError?.message ?? (status === null ? "did not answer within 20 s" : `ended with ${status}`);
+  const reason =
+    startError?.message ?? (status === null ? "did not answer within 20 s" : `ended with ${status}`);
   if (status === null && startError === null) await stop();
   else process.off("exit", endWithUs);
   throw new Error(`pointwrightd ${reason}\n${log}`);
