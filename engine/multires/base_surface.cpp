@@ -187,9 +187,10 @@ void refit_normals(const Points& position, const NeighborGraph& graph, Points& n
   parallel_for(position.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       PlaneFit fit;
-      fit.add(Vec3d::Zero(), 1.0);
+      fit.add(0.0, 0.0, 0.0, 1.0);
       for (std::uint32_t j = 0; j < graph.k; ++j) {
-        fit.add((position[graph.index(i, j)] - position[i]).cast<double>(), 1.0);
+        const Vec3d offset = (position[graph.index(i, j)] - position[i]).cast<double>();
+        fit.add(offset.x(), offset.y(), offset.z(), 1.0);
       }
       Vec3d n;
       const Vec3d before = normal[i].cast<double>();

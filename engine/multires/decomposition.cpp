@@ -30,27 +30,54 @@ struct BasePoint {
   bool converged = false;
 };
 
-class Projector {
- public:
-  Projector(const BaseSurface& base, const KdTree& tree) : base_(base), tree_(tree) {}
+// One sample of Q beside its normal, so that a candidate costs one cache line.
+struct alignas(32) PackedSample {
+  float x, y, z;
+  float nx, ny, nz;
+};
 
-  // The weighted plane of Q's samples around r, by walking the cached graph from `q` (updated to the nearest
-  // found).
-  Plane plane_by_walk(const Vec3f& r, std::uint32_t& q, const Plane& last) {
-    q = walk(r, q);
-    count_ = 0;
-    candidate(q, r);
-    for (std::uint32_t j = 0; j < base_.graph.k; ++j) {
-      if (base_.graph.index(q, j) != q) candidate(base_.graph.index(q, j), r);
+std::vector<PackedSample> pack(const BaseSurface& base) {
+  std::vector<PackedSample> packed(base.position.size());
+  for (std::size_t i = 0; i < packed.size(); ++i) {
+    const Vec3f p = base.position[i];
+    const Vec3f n = base.normal[i];
+    packed[i] = {p.x(), p.y(), p.z(), n.x(), n.y(), n.z()};
+  }
+  return packed;
+}
+
+// Fits planes to Q around a point. One for each thread: it owns the candidate list.
+class PlaneFitter {
+ public:
+  PlaneFitter(const BaseSurface& base, const std::vector<PackedSample>& samples, const KdTree& tree)
+      : base_(base), samples_(samples), tree_(tree) {}
+
+  // The weighted plane of Q's samples around r: hops from `q` to the nearest of its cached neighbours until
+  // none is nearer (q is updated), then fits to that sample and its neighbours.
+  Plane by_walk(const Vec3f& r, std::uint32_t& q, const Plane& last) {
+    for (;;) {
+      count_ = 0;
+      add_candidate(q, r);
+      std::size_t nearest = 0;
+      for (std::uint32_t j = 0; j < base_.graph.k; ++j) {
+        const std::uint32_t next = base_.graph.index(q, j);
+        if (next == q) continue;
+        add_candidate(next, r);
+        if (distance_sq_[count_ - 1] < distance_sq_[nearest]) nearest = count_ - 1;
+      }
+      if (nearest == 0) break;
+      q = index_[nearest];
     }
     return fit(r, last);
   }
-  Plane plane_by_tree(const Vec3f& r, const Plane& last) {
+
+  // The same with exact neighbours, those of another sheet left out.
+  Plane by_tree(const Vec3f& r, const Plane& last) {
     tree_.nearest(r, 2 * (kCachedNeighbors + 1), found_);
     count_ = 0;
     for (const Neighbor& neighbor : found_) {
       if (count_ > kCachedNeighbors) break;
-      if (base_.normal[neighbor.index].cast<double>().dot(last.normal) <= 0.0) continue;  // another sheet
+      if (base_.normal[neighbor.index].cast<double>().dot(last.normal) <= 0.0) continue;
       index_[count_] = neighbor.index;
       distance_sq_[count_++] = neighbor.distance_sq;
     }
@@ -58,47 +85,40 @@ class Projector {
   }
 
  private:
-  void candidate(std::uint32_t q, const Vec3f& r) {
+  void add_candidate(std::uint32_t q, const Vec3f& r) {
+    const PackedSample& s = samples_[q];
+    const float dx = s.x - r.x();
+    const float dy = s.y - r.y();
+    const float dz = s.z - r.z();
     index_[count_] = q;
-    distance_sq_[count_++] = (base_.position[q] - r).squaredNorm();
+    distance_sq_[count_++] = dx * dx + dy * dy + dz * dz;
   }
-  // Hops to the nearest of the cached neighbours until none is nearer.
-  std::uint32_t walk(const Vec3f& r, std::uint32_t q) const {
-    float best = (base_.position[q] - r).squaredNorm();
-    for (bool moved = true; moved;) {
-      moved = false;
-      const std::uint32_t from = q;
-      for (std::uint32_t j = 0; j < base_.graph.k; ++j) {
-        const std::uint32_t next = base_.graph.index(from, j);
-        const float distance_sq = (base_.position[next] - r).squaredNorm();
-        if (distance_sq < best) {
-          best = distance_sq;
-          q = next;
-          moved = true;
-        }
-      }
-    }
-    return q;
+
+  // Squared radius at which the weights vanish: the distance of the first candidate beyond the
+  // kPlaneNeighbors nearest; a little beyond the farthest where there are no more.
+  [[nodiscard]] double support_sq() const {
+    std::array<float, kCachedNeighbors + 1> sorted{};
+    const auto end = std::copy_n(distance_sq_.begin(), count_, sorted.begin());
+    if (count_ <= kPlaneNeighbors) return 1.5 * static_cast<double>(*std::max_element(sorted.begin(), end));
+    std::nth_element(sorted.begin(), sorted.begin() + kPlaneNeighbors, end);
+    return static_cast<double>(sorted[kPlaneNeighbors]);
   }
+
   Plane fit(const Vec3f& r, const Plane& last) {
     if (count_ == 0) return last;
-    // r_k: the distance to the first sample beyond the kPlaneNeighbors nearest, where the weights vanish.
-    std::array<float, kCachedNeighbors + 1> sorted{};
-    std::copy_n(distance_sq_.begin(), count_, sorted.begin());
-    const std::size_t rank = std::min<std::size_t>(kPlaneNeighbors, count_ - 1);
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(rank),
-                     sorted.begin() + static_cast<std::ptrdiff_t>(count_));
-    const double radius_sq = static_cast<double>(sorted[rank]) * (count_ <= kPlaneNeighbors ? 1.5 : 1.0);
+    const double radius_sq = support_sq();
     PlaneFit plane;
     Vec3d side = Vec3d::Zero();
     for (std::size_t c = 0; c < count_; ++c) {
       const double inside = radius_sq > 0.0 ? 1.0 - static_cast<double>(distance_sq_[c]) / radius_sq : 1.0;
       if (inside <= 0.0) continue;
-      const Vec3d n = base_.normal[index_[c]].cast<double>();
+      const PackedSample& s = samples_[index_[c]];
+      const Vec3d n(static_cast<double>(s.nx), static_cast<double>(s.ny), static_cast<double>(s.nz));
       // Samples of an opposite sheet fade out; same-sheet ones count whole.
       const double facing = std::clamp(2.0 * n.dot(last.normal), 0.0, 1.0);
       const double weight = inside * inside * inside * inside * facing;
-      plane.add((base_.position[index_[c]] - r).cast<double>(), weight);
+      plane.add(static_cast<double>(s.x - r.x()), static_cast<double>(s.y - r.y()),
+                static_cast<double>(s.z - r.z()), weight);
       side += weight * n;
     }
     if (!(plane.weight() > 1e-12)) return last;
@@ -109,6 +129,7 @@ class Projector {
   }
 
   const BaseSurface& base_;
+  const std::vector<PackedSample>& samples_;
   const KdTree& tree_;
   std::vector<Neighbor> found_;
   std::array<std::uint32_t, kCachedNeighbors + 1> index_{};
@@ -155,6 +176,7 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
   result.normal.resize(n);
   result.detail.assign(n, 0.0F);
   const KdTree tree(base.position);
+  const std::vector<PackedSample> samples = pack(base);
   const double tolerance = static_cast<double>(params.tolerance_spacing) * static_cast<double>(spacing);
   const double give_up = static_cast<double>(kFallbackResidual * spacing);
   const double far = static_cast<double>(kFallbackDetail * base.scale);
@@ -165,7 +187,7 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
   parallel_for(
       n,
       [&](std::size_t begin, std::size_t end) {
-        Projector projector(base, tree);
+        PlaneFitter fitter(base, samples, tree);
         Counts& count = counts[begin / kParallelBlock];
         for (std::size_t i = begin; i < end; ++i) {
           const Vec3d p = position[i].cast<double>();
@@ -175,13 +197,13 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
           BasePoint found{.r = project(p, own_plane), .plane = own_plane};
           iterate(
               p, tolerance, params.walk_limit, true,
-              [&](const Vec3f& r, const Plane& last) { return projector.plane_by_walk(r, q, last); }, found);
+              [&](const Vec3f& r, const Plane& last) { return fitter.by_walk(r, q, last); }, found);
           if (!found.converged) {
             found.r = project(p, own_plane);
             found.plane = own_plane;
             iterate(
                 p, tolerance, params.tree_limit, false,
-                [&](const Vec3f& r, const Plane& last) { return projector.plane_by_tree(r, last); }, found);
+                [&](const Vec3f& r, const Plane& last) { return fitter.by_tree(r, last); }, found);
             if (!found.converged) ++count.at_limit;
           }
           count.iterations += found.iterations;
