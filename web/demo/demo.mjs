@@ -1,0 +1,242 @@
+// The demonstration: turns the Stanford dragon's head through the public HTTP API, checks the result against what was
+// asked for, and takes pictures with the real viewer. `make demo` builds what it needs and runs it.
+import { spawn } from "node:child_process";
+import { mkdirSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
+import { dirname, relative, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+import { startDaemon } from "./daemon.mjs";
+import { oneOperations, regionOf, turn, zeroOperations } from "./dragon.mjs";
+import { readPly } from "./ply.mjs";
+import { fitRigidMotion } from "./rigid.mjs";
+
+const root = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
+const out = resolve(root, "build/demo");
+const dragon = resolve(root, "build/data/dragon.drc");
+const angleDeg = 40;
+const previewCount = 12;
+const camera = { position: [-0.06, 0.185, 0.42], target: [-0.005, 0.122, 0], up: [0, 1, 0] };
+
+const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+const here = (path) => relative(process.cwd(), path);
+const say = (label, ms, detail) =>
+  console.log(`  ${label.padEnd(30)} ${(ms / 1000).toFixed(2).padStart(7)} s   ${detail}`);
+/** Runs one step and prints its line; `work` answers what to say about it, or [what to say, the step's result]. */
+async function step(label, work) {
+  const start = performance.now();
+  const answer = await work();
+  const [detail, result] = Array.isArray(answer) ? answer : [answer];
+  say(label, performance.now() - start, detail);
+  return result;
+}
+function demand(condition, reason) {
+  if (!condition) throw new Error(reason);
+}
+const megabytes = (bytes) => `${(bytes / 1e6).toFixed(1)} MB`;
+const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
+
+/** A request to the API; anything but success is an error with the problem document's own words. */
+async function call(url, method, path, { json, body, headers = {} } = {}) {
+  const response = await fetch(url + path, {
+    method,
+    headers: { ...(json ? { "Content-Type": "application/json" } : {}), ...headers },
+    body: json ? JSON.stringify(json) : body,
+  });
+  if (!response.ok) {
+    const text = await response.text();
+    throw new Error(`${method} ${path} answered ${response.status}: ${text.slice(0, 2000)}`);
+  }
+  return response;
+}
+
+async function waitUntilReady(url, session) {
+  for (;;) {
+    const document = await (await call(url, "GET", session)).json();
+    if (document.state === "ready") return document;
+    demand(
+      document.state === "building",
+      `the session failed: ${JSON.stringify(document.error ?? document)}`,
+    );
+    await sleep(20);
+  }
+}
+
+/** One preview as a tool asks for it: the parameters go, the exact frame comes back. Answers its milliseconds and bytes. */
+async function preview(url, session, sequence, revision) {
+  const start = performance.now();
+  const edit = { ...turn((angleDeg * sequence) / previewCount), sequence };
+  const response = await call(url, "POST", `${session}/preview?attributes=normal,t`, { json: edit });
+  const frame = Buffer.from(await response.arrayBuffer());
+  const ms = performance.now() - start;
+  demand(frame.subarray(0, 4).toString("latin1") === "PWFR", "the preview is not a frame");
+  demand(frame.readUInt32LE(8) === frame.length, "the frame's length is not what its header says");
+  demand(Number(frame.readBigUInt64LE(16)) === revision, "the frame shows another revision");
+  demand(Number(frame.readBigUInt64LE(24)) === sequence, "the frame shows another preview");
+  return { ms, bytes: frame.length };
+}
+
+function takePicture(url, sessionId, name, mode) {
+  const file = resolve(out, name);
+  const args = ["web/scripts/pictures.mjs", "--url", url, "--session", sessionId, "--out", file];
+  args.push("--camera", JSON.stringify(camera), "--mode", mode, "--size", "1600x1000", "--ui", "0");
+  return new Promise((done, fail) => {
+    const child = spawn(process.execPath, args, { cwd: root, stdio: ["ignore", "pipe", "pipe"] });
+    let text = "";
+    child.stdout.on("data", (chunk) => (text += chunk));
+    child.stderr.on("data", (chunk) => (text += chunk));
+    child.on("error", fail);
+    child.on("close", (status) =>
+      status === 0 ? done(here(file)) : fail(new Error(`no picture ${name} (status ${status}):\n${text}`)),
+    );
+  });
+}
+
+/** Compares the download with the upload. Answers what to say; throws where the edit is not the one that was asked for. */
+function verify(before, after, diagonal) {
+  demand(before.count === after.count, `${before.count} samples went in, ${after.count} came out`);
+  demand(after.positions.every(Number.isFinite), "the result has samples that are not finite");
+  const samples = { zero: [], one: [], free: [] };
+  const p = [0, 0, 0];
+  for (let i = 0; i < before.count; i++) {
+    for (let axis = 0; axis < 3; axis++) p[axis] = before.positions[3 * i + axis];
+    samples[regionOf(p, 1e-6 * diagonal)]?.push(i);
+  }
+  const moved = samples.zero.filter((i) =>
+    [0, 1, 2].some((k) => !Object.is(before.positions[3 * i + k], after.positions[3 * i + k])),
+  );
+  demand(samples.zero.length > 0, "no sample lies in the zero-region");
+  demand(
+    moved.length === 0,
+    `${moved.length} of ${samples.zero.length} samples of the zero-region have moved`,
+  );
+
+  const { deformation } = turn(angleDeg);
+  const length = Math.hypot(...deformation.axis.direction);
+  const motion = fitRigidMotion(before.positions, after.positions, samples.one);
+  const cosine = motion.axis.reduce(
+    (sum, value, i) => sum + (value * deformation.axis.direction[i]) / length,
+    0,
+  );
+  const tiltDeg = (Math.acos(Math.min(1, cosine)) * 180) / Math.PI;
+  demand(
+    Math.abs(motion.angleDeg - angleDeg) < 0.01,
+    `the head turned by ${motion.angleDeg}°, not by ${angleDeg}°`,
+  );
+  demand(tiltDeg < 0.01, `the head turned about an axis that is off by ${tiltDeg}°`);
+  demand(
+    motion.rms < 1e-5 * diagonal,
+    `the head is bent: ${motion.rms / diagonal} of the diagonal from a rigid motion (rms)`,
+  );
+  return (
+    `${samples.zero.length} samples of the zero-region are where they were, to the bit; ${samples.one.length} of the ` +
+    `one-region turned by ${motion.angleDeg.toFixed(3)}°, rigid to ${((1e6 * motion.rms) / diagonal).toFixed(2)} ppm of the ` +
+    `diagonal (rms; ${((1e6 * motion.max) / diagonal).toFixed(1)} at most); ${samples.free.length} between them follow`
+  );
+}
+
+async function tell(url) {
+  const drc = readFileSync(dragon);
+  const cloud = await step("upload the scan", async () => {
+    const headers = { "Content-Type": "model/x-draco" };
+    const document = await (
+      await call(url, "POST", "/v1/clouds?name=Stanford%20dragon", { body: drc, headers })
+    ).json();
+    return [`${document.sample_count} samples, ${megabytes(drc.length)} of Draco`, document];
+  });
+  const session = await step("split shape and detail", async () => {
+    const response = await call(url, "POST", "/v1/sessions", {
+      json: { cloud: cloud.id, name: "Demo", scales: [0.02] },
+    });
+    const path = response.headers.get("location");
+    demand(response.status === 202 && path, "POST /v1/sessions did not answer 202 with a Location");
+    const document = await waitUntilReady(url, path);
+    const band = document.decomposition[0];
+    return [
+      `details up to ${((100 * band.max_detail) / document.diagonal).toFixed(2)} % of the diagonal`,
+      { path, ...document },
+    ];
+  });
+  await step("picture: before", () => takePicture(url, session.id, "before.png", "shaded"));
+
+  await step("paint what stays", async () => {
+    const response = await call(url, "PUT", `${session.path}/regions/zero`, {
+      json: { operations: zeroOperations },
+    });
+    return `${(await response.json()).regions.zero.samples} samples`;
+  });
+  const revision = await step("paint what moves", async () => {
+    let document;
+    for (const operation of oneOperations) {
+      document = await (
+        await call(url, "POST", `${session.path}/regions/one/operations`, { json: operation })
+      ).json();
+    }
+    return [`${document.regions.one.samples} samples`, document.revision];
+  });
+  await step("picture: painted", () => takePicture(url, session.id, "painted.png", "regions"));
+
+  await step("drag the head", async () => {
+    const frames = [];
+    for (let sequence = 1; sequence <= previewCount; sequence++)
+      frames.push(await preview(url, session.path, sequence, revision));
+    await call(url, "DELETE", `${session.path}/preview`);
+    const times = frames.map(({ ms }) => ms);
+    return `${previewCount} frames, ${median(times).toFixed(1)} ms each (${Math.max(...times).toFixed(1)} at most), ${megabytes(frames[0].bytes)}`;
+  });
+  await step("commit the edit", async () => {
+    const json = turn(angleDeg);
+    const response = await call(url, "POST", `${session.path}/edits`, {
+      json,
+      headers: { "If-Match": `"r${revision}"` },
+    });
+    const record = await response.json();
+    return `${record.moved_samples} samples moved, now at revision ${response.headers.get("etag")}`;
+  });
+  const download = async (path) => Buffer.from(await (await call(url, "GET", path)).arrayBuffer());
+  const edited = await step("download the result", async () => {
+    const bytes = await download(`${session.path}/samples?format=ply`);
+    const file = resolve(out, "dragon-edited.ply");
+    writeFileSync(file, bytes);
+    return [`${here(file)}, ${megabytes(statSync(file).size)}`, bytes];
+  });
+  await step("check it", async () => {
+    const original = await download(`/v1/clouds/${cloud.id}/data?format=ply`);
+    return verify(readPly(original), readPly(edited), cloud.diagonal);
+  });
+  await step("picture: after", () => takePicture(url, session.id, "after.png", "shaded"));
+}
+
+async function main() {
+  rmSync(out, { recursive: true, force: true });
+  mkdirSync(out, { recursive: true });
+  console.log(
+    "Turning the head of the Stanford dragon (Stanford 3D Scanning Repository, Stanford Computer Graphics Laboratory).",
+  );
+  const start = performance.now();
+  const daemon = await step("start the daemon", async () => {
+    const started = await startDaemon(["--web", resolve(root, "web/dist")]);
+    return [started.url, started];
+  });
+  for (const signal of ["SIGINT", "SIGTERM"])
+    process.once(signal, () => daemon.stop().then(() => process.exit(130)));
+  let failure = null;
+  try {
+    await tell(daemon.url);
+  } catch (error) {
+    failure = error;
+  }
+  const status = await daemon.stop();
+  if (failure) {
+    console.error(`\ndemo: ${failure.message}`);
+    console.error(`The daemon said:\n${daemon.log().split("\n").slice(-20).join("\n")}`);
+  } else if (status !== 0) {
+    console.error(`\ndemo: the daemon ended with ${status}\n${daemon.log()}`);
+  } else {
+    say("all", performance.now() - start, `pictures in ${here(out)}`);
+  }
+  process.exitCode = failure || status !== 0 ? 1 : 0;
+}
+
+main().catch((error) => {
+  console.error(`demo: ${error.message}`);
+  process.exitCode = 1;
+});
