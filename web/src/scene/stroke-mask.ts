@@ -17,6 +17,8 @@ export class StrokeMask {
   private readonly changed_: () => void;
   private readonly segments_: Segment[] = [];
   private camera_: PerspectiveCamera | null = null;
+  private frameRevision_ = 0;
+  private until_: number | null = null;
 
   constructor(passes: Passes, changed: () => void) {
     this.passes_ = passes;
@@ -25,6 +27,7 @@ export class StrokeMask {
 
   begin(color: readonly [number, number, number]): void {
     this.segments_.length = 0;
+    this.until_ = null;
     this.passes_.set(this.passes_.present, "maskColor", new Vector3(...color));
   }
 
@@ -35,8 +38,20 @@ export class StrokeMask {
     this.changed_();
   }
 
+  /** Clears once a frame of `revision` or later is on the screen, or now where one is. */
+  clearAtRevision(revision: number): void {
+    this.until_ = revision;
+    this.frameShown(this.frameRevision_);
+  }
+
+  frameShown(revision: number): void {
+    this.frameRevision_ = revision;
+    if (this.until_ !== null && revision >= this.until_) this.clear();
+  }
+
   clear(): void {
     this.segments_.length = 0;
+    this.until_ = null;
     this.passes_.set(this.passes_.present, "showMask", false);
     this.changed_();
   }

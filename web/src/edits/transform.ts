@@ -1,0 +1,169 @@
+import type { ApiClient } from "../api/client";
+import { problemOf } from "../api/problem";
+import type { Deformation, EditBody, SessionDocument } from "../api/types";
+import type { CommandQueue } from "../command-queue";
+import type { TransformState } from "../event-map";
+import type { Vec3 } from "../math/vec3";
+import type { Bus, SessionStore } from "../session-store";
+import { deformationFault, describeDeformation, isIdentity } from "./deformation";
+import { reportError } from "./errors";
+import { PreviewSender } from "./preview";
+
+/** The level that edits act on: this version edits the smooth base. */
+const EDIT_LEVEL = 0;
+
+function obstacleOf(session: SessionDocument): string | null {
+  if (session.state !== "ready") return "The session is still being prepared.";
+  const { zero, one } = session.regions;
+  if (zero.samples === 0 && one.samples === 0) return "Paint a zero-region that stays and a one-region that moves.";
+  if (zero.samples === 0) return "Paint a zero-region: what must stay in place.";
+  if (one.samples === 0) return "Paint a one-region: what must move as a whole.";
+  return null;
+}
+
+/** The transform that is being made: previewed while it changes, recorded or dropped at its end. */
+export class TransformEditor {
+  readonly preview: PreviewSender;
+  private readonly bus_: Bus;
+  private readonly client_: ApiClient;
+  private readonly queue_: CommandQueue;
+  private readonly store_: SessionStore;
+  private deformation_: Deformation | null = null;
+  private pivot_: Vec3 = [0, 0, 0];
+  private axis_: TransformState["axis"] = null;
+  private pivotEditing_ = false;
+  private committing_: number | null = null;
+
+  constructor(bus: Bus, client: ApiClient, queue: CommandQueue, store: SessionStore, onResidual: (d: Deformation | null) => void) {
+    this.bus_ = bus;
+    this.client_ = client;
+    this.queue_ = queue;
+    this.store_ = store;
+    this.preview = new PreviewSender(
+      {
+        put: (deformation, sequence) => client.putPreview(store.id, this.body(deformation), sequence),
+        end: () => client.endPreview(store.id),
+      },
+      {
+        onResidual,
+        onAhead: () => bus.fire("preview.changed", { state: "preview", latencyMs: 0, samplesPerSecond: 0 }),
+        onExact: (latencyMs) => {
+          const samplesPerSecond = latencyMs > 0 ? (store.document.sample_count / latencyMs) * 1000 : 0;
+          bus.fire("preview.changed", { state: "exact", latencyMs, samplesPerSecond });
+        },
+        onError: (error) => reportError(bus, error, "The preview was refused"),
+      },
+      Date.now(),
+    );
+    bus.function("edit.commit", () => this.commit());
+    bus.function("edit.cancel", () => this.cancel());
+    bus.on("session.changed", () => this.tell());
+    bus.on("frame.applied", ({ sequence, revision }) => {
+      // The recorded edit's frame may come before the answer that says so.
+      if (this.committing_ !== null && sequence === 0 && revision > this.committing_) this.settle();
+      this.preview.frameShown(sequence);
+    });
+  }
+
+  get state(): TransformState {
+    return {
+      deformation: this.deformation_,
+      pivot: this.pivot_,
+      axis: this.axis_,
+      pivotEditing: this.pivotEditing_,
+      obstacle: obstacleOf(this.store_.document),
+    };
+  }
+
+  /** Whether something waits to be recorded or dropped. */
+  get pending(): boolean {
+    return this.deformation_ !== null && !isIdentity(this.deformation_);
+  }
+
+  set(deformation: Deformation): void {
+    if (this.state.obstacle || deformationFault(deformation)) return;
+    this.deformation_ = deformation;
+    this.preview.want(deformation);
+    this.tell();
+  }
+
+  /** Where rotations turn about, in model space. */
+  setPivot(pivot: Vec3): void {
+    this.pivot_ = pivot;
+    const deformation = this.deformation_;
+    if (deformation?.type === "rotation" && !isIdentity(deformation)) {
+      this.set({ ...deformation, axis: { ...deformation.axis, point: pivot } });
+    } else {
+      this.tell();
+    }
+  }
+
+  setAxis(axis: TransformState["axis"]): void {
+    this.axis_ = axis;
+    this.tell();
+  }
+
+  setPivotEditing(editing: boolean): void {
+    this.pivotEditing_ = editing;
+    this.tell();
+  }
+
+  cancel(): void {
+    this.deformation_ = null;
+    this.pivotEditing_ = false;
+    this.tell();
+    this.bus_.fire("preview.changed", { state: "none", latencyMs: 0, samplesPerSecond: 0 });
+    void this.preview.cancel().catch((error: unknown) => reportError(this.bus_, error, "The preview could not be ended"));
+  }
+
+  /** Records the transform; afterwards nothing is pending, or, where the server refuses, it is pending still. */
+  async commit(): Promise<void> {
+    const deformation = this.deformation_;
+    if (!deformation || isIdentity(deformation)) return;
+    await this.queue_.enqueue(async () => {
+      await this.preview.idle();
+      const revision = this.store_.document.revision;
+      this.committing_ = revision;
+      try {
+        await this.client_.commitEdit(this.store_.id, this.body(deformation), revision);
+        this.settle();
+        this.store_.update(await this.client_.session(this.store_.id));
+        this.bus_.fire("history.changed", await this.client_.history(this.store_.id));
+        this.bus_.fire("toast", { kind: "success", title: describeDeformation(deformation) });
+      } catch (error) {
+        await this.failed(error);
+      } finally {
+        this.committing_ = null;
+      }
+    });
+  }
+
+  private async failed(error: unknown): Promise<void> {
+    if (problemOf(error).status !== 412) {
+      reportError(this.bus_, error, "The edit was not recorded");
+      return;
+    }
+    this.store_.update(await this.client_.session(this.store_.id));
+    this.bus_.fire("history.changed", await this.client_.history(this.store_.id));
+    this.bus_.fire("toast", {
+      kind: "error",
+      title: "The session has changed meanwhile",
+      lines: ["Someone else painted or edited. Look at the new state, then apply again."],
+    });
+  }
+
+  private settle(): void {
+    this.deformation_ = null;
+    this.preview.settle();
+    this.bus_.fire("preview.changed", { state: "none", latencyMs: 0, samplesPerSecond: 0 });
+    this.tell();
+  }
+
+  private body(deformation: Deformation): EditBody {
+    return { level: EDIT_LEVEL, deformation };
+  }
+
+  private tell(): void {
+    this.bus_.fire("transform.changed", this.state);
+  }
+}

@@ -1,0 +1,154 @@
+import type { ApiClient } from "./api/client";
+import { ApiError } from "./api/problem";
+import { FrameReader } from "./api/frame-reader";
+import { SessionStream, type StreamEvent, type StreamSink } from "./api/stream";
+import { reportError } from "./edits/errors";
+import { type FrameBlock, type FrameHeader, hasAttribute } from "./protocol/frames";
+import type { Viewport } from "./scene/viewport";
+import type { Bus, SessionStore } from "./session-store";
+
+/** A stream tells at most this often how much of a key frame has come. */
+const TELL_MS = 80;
+
+/**
+ * Where the picture's samples come from: the session's stream, or one frame of a coarser level. Each block goes to the GPU
+ * as it comes.
+ */
+export class FrameSource implements StreamSink {
+  /** What the screen last showed whole. */
+  last: FrameHeader | null = null;
+
+  private readonly bus_: Bus;
+  private readonly client_: ApiClient;
+  private readonly store_: SessionStore;
+  private readonly viewport_: Viewport;
+  private readonly stream_: SessionStream;
+  private readonly onFirst_: (header: FrameHeader) => void;
+  private level_: number | null = null;
+  private abort_ = new AbortController();
+  private told_ = 0;
+
+  constructor(bus: Bus, client: ApiClient, store: SessionStore, viewport: Viewport, onFirst: (header: FrameHeader) => void) {
+    this.bus_ = bus;
+    this.client_ = client;
+    this.store_ = store;
+    this.viewport_ = viewport;
+    this.onFirst_ = onFirst;
+    this.stream_ = new SessionStream(client, store.id, this, {
+      onState: (state) => bus.fire("connection.changed", state),
+      mayRetry: (error) => {
+        const status = error instanceof ApiError ? error.status : 0;
+        const passing = status === 0 || status === 409 || status === 429 || status >= 500;
+        if (!passing) reportError(bus, error, "The stream was refused");
+        return passing;
+      },
+    });
+  }
+
+  start(): void {
+    this.stream_.start();
+  }
+
+  /** Begins anew with a key frame, as after a lost context. */
+  restart(): void {
+    this.viewport_.clearSurface();
+    if (this.level_ === null) this.stream_.start();
+    else void this.loadLevel(this.level_);
+  }
+
+  /** Shows a coarser level, or, with null, the whole surface as it streams. */
+  showLevel(level: number | null): void {
+    if (level === this.level_) return;
+    this.level_ = level;
+    this.abort_.abort();
+    if (level === null) {
+      this.stream_.start();
+    } else {
+      this.stream_.stop();
+      void this.loadLevel(level);
+    }
+  }
+
+  stop(): void {
+    this.stream_.stop();
+    this.abort_.abort();
+  }
+
+  frameBegin(header: FrameHeader): void {
+    const key = header.kind === "key";
+    this.viewport_.beginFrame(
+      {
+        sampleCount: header.sampleCount,
+        blockSize: header.blockSize,
+        blockCount: header.blockCount,
+        hasNormals: hasAttribute(header, "normal"),
+        hasDetail: hasAttribute(header, "detail"),
+        hasColor: hasAttribute(header, "color"),
+        hasMarks: hasAttribute(header, "marks"),
+      },
+      key,
+    );
+    this.viewport_.setBounds(header.bounds.center, header.bounds.radius, header.stretchRange);
+    if (this.last === null) this.onFirst_(header);
+    if (this.last?.detailRange !== header.detailRange) this.bus_.fire("detail.range", header.detailRange);
+    if (this.last === null) this.last = header;
+    if (key) this.tellLoad(header, false);
+  }
+
+  frameBlock(block: FrameBlock, header: FrameHeader): void {
+    this.viewport_.putBlock({
+      index: block.number,
+      count: block.count,
+      minimum: block.minimum,
+      extent: block.extent,
+      positions: block.positionT,
+      normals: block.normal,
+      detail: block.detailStretch,
+      color: block.color,
+      marks: block.marks,
+    });
+    if (header.kind === "key" && performance.now() - this.told_ > TELL_MS) this.tellLoad(header, false);
+  }
+
+  frameEnd(header: FrameHeader): void {
+    this.last = header;
+    const { sequence, revision } = header;
+    this.tellLoad(header, true);
+    this.viewport_.mask.frameShown(revision);
+    this.bus_.fire("frame.applied", { sequence, revision, key: header.kind === "key" });
+  }
+
+  event(event: StreamEvent): void {
+    if (event.event !== "session") return;
+    const { event: _, ...document } = event;
+    this.store_.update(document);
+  }
+
+  private tellLoad(header: FrameHeader, complete: boolean): void {
+    this.told_ = performance.now();
+    this.bus_.fire("load.changed", { loaded: this.viewport_.loadedSamples, total: header.sampleCount, complete });
+  }
+
+  /** One frame by itself, as a response body. */
+  private async loadLevel(level: number): Promise<void> {
+    this.abort_ = new AbortController();
+    const { signal } = this.abort_;
+    try {
+      const response = await this.client_.frame(this.store_.id, level, signal);
+      const bytes = new Uint8Array(await response.arrayBuffer());
+      if (signal.aborted) return;
+      const frame = new FrameReader(bytes.byteLength);
+      frame.fill((into) => {
+        into.set(bytes);
+        return bytes.byteLength;
+      });
+      const { header } = frame;
+      if (!header) return;
+      this.frameBegin(header);
+      for (let block = frame.next(); block; block = frame.next()) this.frameBlock(block, header);
+      this.frameEnd(header);
+    } catch (error) {
+      if (!signal.aborted) reportError(this.bus_, error, "This level could not be shown");
+    }
+  }
+}

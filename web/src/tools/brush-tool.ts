@@ -1,0 +1,199 @@
+import type { RegionName, RegionOperation, SessionDocument } from "../api/types";
+import type { RegionEditor } from "../edits/regions";
+import type { ToolName } from "../event-map";
+import { add, normalise, type Vec3 } from "../math/vec3";
+import { ONE_COLOR, ZERO_COLOR } from "../scene/passes";
+import type { Hit } from "../scene/picker";
+import type { Viewport } from "../scene/viewport";
+import type { SessionStore } from "../session-store";
+import { isDepthJump, isNewVertex, simplifyStroke } from "./stroke";
+import type { Tool } from "./tool";
+
+export type BrushKind = "zero" | "one" | "erase";
+
+type Color = readonly [number, number, number];
+const ERASER_COLOR: Color = [0.86, 0.87, 0.9];
+const COLORS: Record<BrushKind, Color> = { zero: ZERO_COLOR, one: ONE_COLOR, erase: ERASER_COLOR };
+/** Of the radius: what a stroke may be simplified by. */
+const TOLERANCE = 0.06;
+const BARE_COLOR: Color = [0.66, 0.64, 0.6];
+
+/** The brush's radius, shared by the three brushes, in model units. */
+export interface BrushSize {
+  radius: number;
+}
+
+interface Stroke {
+  pointer: number;
+  kind: BrushKind;
+  parts: Vec3[][];
+  last: Hit;
+  towardsCamera: Vec3;
+}
+
+/** Paints on the surface: the stroke shows at once, and becomes operations of the region when the hand lifts. */
+export class BrushTool implements Tool {
+  readonly name: ToolName;
+  private readonly kind_: BrushKind;
+  private readonly viewport_: Viewport;
+  private readonly store_: SessionStore;
+  private readonly regions_: RegionEditor;
+  private readonly size_: BrushSize;
+  private listeners_: AbortController | null = null;
+  private stroke_: Stroke | null = null;
+  private pointer_: { x: number; y: number; shift: boolean } | null = null;
+  private frame_ = 0;
+  private strokes_ = 0;
+
+  constructor(kind: BrushKind, viewport: Viewport, store: SessionStore, regions: RegionEditor, size: BrushSize) {
+    this.name = kind;
+    this.kind_ = kind;
+    this.viewport_ = viewport;
+    this.store_ = store;
+    this.regions_ = regions;
+    this.size_ = size;
+  }
+
+  activate(): void {
+    this.viewport_.rig.setPainting(true);
+    this.viewport_.canvas.classList.add("painting");
+    this.listeners_ = new AbortController();
+    const { signal } = this.listeners_;
+    const canvas = this.viewport_.canvas;
+    // On the way down to the canvas, so that a press on the surface paints and never reaches the camera.
+    const holder = canvas.parentElement ?? canvas;
+    holder.addEventListener("pointerdown", this.down, { signal, capture: true });
+    canvas.addEventListener("pointermove", this.move, { signal });
+    canvas.addEventListener("pointerup", this.up, { signal });
+    canvas.addEventListener("pointercancel", this.abandon, { signal });
+    canvas.addEventListener("pointerleave", this.leave, { signal });
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
+  }
+
+  deactivate(): void {
+    this.finish();
+    this.listeners_?.abort();
+    cancelAnimationFrame(this.frame_);
+    this.frame_ = 0;
+    this.viewport_.canvas.classList.remove("painting");
+    this.viewport_.rig.setPainting(false);
+    this.viewport_.setRing(null);
+  }
+
+  /** Draws the ring again, for a radius that has changed under a resting hand. */
+  refresh(): void {
+    if (this.listeners_ && !this.listeners_.signal.aborted && this.pointer_) this.scheduleRing();
+  }
+
+  private readonly down = (event: PointerEvent): void => {
+    if (event.button !== 0 || event.target !== this.viewport_.canvas || this.stroke_) return;
+    const hit = this.viewport_.pick(event.clientX, event.clientY);
+    if (!hit) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.viewport_.canvas.focus({ preventScroll: true });
+    this.viewport_.canvas.setPointerCapture(event.pointerId);
+    const kind = event.shiftKey ? "erase" : this.kind_;
+    this.stroke_ = { pointer: event.pointerId, kind, parts: [[hit.position]], last: hit, towardsCamera: hit.towardsCamera };
+    this.viewport_.rig.setEnabled(false);
+    this.viewport_.mask.begin(kind === "erase" ? BARE_COLOR : COLORS[kind]);
+    this.viewport_.mask.add(hit.position, hit.position, this.size_.radius);
+    this.showRing(hit, kind);
+  };
+
+  private readonly move = (event: PointerEvent): void => {
+    this.pointer_ = { x: event.clientX, y: event.clientY, shift: event.shiftKey };
+    const stroke = this.stroke_;
+    if (!stroke) {
+      if (event.buttons === 0) this.scheduleRing();
+      else this.viewport_.setRing(null);
+      return;
+    }
+    if (event.pointerId !== stroke.pointer) return;
+    const events = event.getCoalescedEvents?.() ?? [];
+    for (const part of events.length > 0 ? events.slice(-4) : [event]) this.extend(stroke, part);
+  };
+
+  private extend(stroke: Stroke, event: PointerEvent): void {
+    const hit = this.viewport_.pick(event.clientX, event.clientY);
+    if (!hit) return;
+    this.showRing(hit, stroke.kind);
+    const { radius } = this.size_;
+    const part = stroke.parts[stroke.parts.length - 1];
+    if (!part || !isNewVertex(part[part.length - 1], hit.position, radius)) return;
+    if (isDepthJump(stroke.last.position, hit.position, stroke.last.depth, hit.depth, radius)) {
+      stroke.parts.push([hit.position]);
+      this.viewport_.mask.add(hit.position, hit.position, radius);
+    } else {
+      part.push(hit.position);
+      this.viewport_.mask.add(stroke.last.position, hit.position, radius);
+    }
+    stroke.last = hit;
+    stroke.towardsCamera = add(stroke.towardsCamera, hit.towardsCamera);
+  }
+
+  private readonly up = (event: PointerEvent): void => {
+    if (this.stroke_ && event.pointerId === this.stroke_.pointer) this.finish();
+  };
+
+  private readonly abandon = (): void => {
+    if (!this.stroke_) return;
+    this.stroke_ = null;
+    this.viewport_.rig.setEnabled(true);
+    this.viewport_.mask.clear();
+  };
+
+  private readonly leave = (): void => {
+    this.pointer_ = null;
+    if (!this.stroke_) this.viewport_.setRing(null);
+  };
+
+  private finish(): void {
+    const stroke = this.stroke_;
+    if (!stroke) return;
+    this.stroke_ = null;
+    this.viewport_.rig.setEnabled(true);
+    this.strokes_ += 1;
+    const own = this.strokes_;
+    void this.send(stroke).then((document) => {
+      // The tint stays until the frame with the server's marks is there; a refused stroke has none to wait for.
+      if (own !== this.strokes_ || this.stroke_) return;
+      if (document) this.viewport_.mask.clearAtRevision(document.revision);
+      else this.viewport_.mask.clear();
+    });
+  }
+
+  private send(stroke: Stroke): Promise<SessionDocument | null> {
+    const facing = normalise(stroke.towardsCamera);
+    const erasing = stroke.kind === "erase";
+    const operations = stroke.parts.map((part) => strokeOperation(part.map((p) => this.store_.toModel(p)), this.size_.radius, facing, erasing));
+    return erasing ? this.regions_.erase(operations) : this.regions_.paint(stroke.kind as RegionName, operations);
+  }
+
+  private scheduleRing(): void {
+    if (this.frame_ !== 0) return;
+    this.frame_ = requestAnimationFrame(() => {
+      this.frame_ = 0;
+      const pointer = this.pointer_;
+      if (!pointer || this.stroke_) return;
+      const hit = this.viewport_.pick(pointer.x, pointer.y);
+      if (hit) this.showRing(hit, pointer.shift ? "erase" : this.kind_);
+      else this.viewport_.setRing(null);
+    });
+  }
+
+  private showRing(hit: Hit, kind: BrushKind): void {
+    this.viewport_.setRing({ position: hit.position, radius: this.size_.radius, color: COLORS[kind] });
+  }
+}
+
+/** A part of a stroke as the server takes it; a single touch is a sphere. */
+export function strokeOperation(vertices: readonly Vec3[], radius: number, facing: Vec3, erase: boolean): RegionOperation {
+  const simple = simplifyStroke(vertices, TOLERANCE * radius);
+  const [first] = simple;
+  const shape =
+    simple.length === 1 && first
+      ? ({ type: "sphere", center: first, radius } as const)
+      : ({ type: "stroke", vertices: simple, radius } as const);
+  return erase ? { mode: "remove", shape, facing } : { mode: "add", shape, facing, steal: true };
+}

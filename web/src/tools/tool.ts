@@ -1,0 +1,9 @@
+import type { ToolName } from "../event-map";
+
+/** One way of working with the pointer. Exactly one is active. */
+export interface Tool {
+  readonly name: ToolName;
+  activate(): void;
+  /** Leaves nothing of the tool on the screen; what it holds unfinished is finished or dropped, as its file says. */
+  deactivate(): void;
+}
