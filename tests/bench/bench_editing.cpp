@@ -1,0 +1,115 @@
+// Painting, the scale field, and the edit of a drag's frame (DESIGN: paint.*; the parts of frame.*).
+#include <cmath>
+#include <numbers>
+
+#include "engine/editing/edit.h"
+#include "engine/editing/painting.h"
+#include "tests/bench/benchmarks.h"
+#include "tests/bench/synthetic_scan.h"
+
+namespace pointwright::bench {
+namespace {
+
+// A torus as base, the scan's bumps as the one band over it.
+MultiresSurface one_band_surface(const Cloud& scan) {
+  const std::size_t n = scan.size();
+  MultiresSurface surface;
+  surface.levels.assign(2, Level{.position = Points(n), .normal = Points(n)});
+  surface.detail.assign(1, std::vector<float>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3f p = scan.position[i];
+    const Vec3f ring = Vec3f(p.x(), p.y(), 0.0F).normalized();
+    const Vec3f normal = (p - ring).normalized();
+    const float d = (p - ring).norm() - 0.4F;
+    surface.levels[0].position.set(i, p - d * normal);
+    surface.levels[0].normal.set(i, normal);
+    surface.levels[1].position.set(i, p);
+    surface.levels[1].normal.set(i, normal);
+    surface.detail[0][i] = d;
+  }
+  return surface;
+}
+
+PaintOperation half(double side) {
+  return {.shape = HalfSpace{.point = Vec3d(side * 0.8, 0.0, 0.0), .normal = Vec3d(side, 0.0, 0.0)}};
+}
+
+Stroke brush_stroke() {
+  Stroke stroke{.vertices = {}, .radius = 0.08};
+  for (int i = 0; i < 40; ++i) stroke.vertices.emplace_back(-1.2 + 0.02 * i, 0.3 * std::sin(0.2 * i), 0.4);
+  return stroke;
+}
+
+struct Size {
+  const char* name;
+  std::size_t samples;
+};
+
+void bench_size(BenchReport& report, const Size& size) {
+  const auto name = [&](const char* what) { return std::string(what) + "." + size.name; };
+  if (!report.wants(name("paint")) && !report.wants(name("scale_field")) &&
+      !report.wants(name("edit.level0"))) {
+    return;
+  }
+  const std::size_t n = size.samples;
+  const auto items = static_cast<double>(n);
+  const MultiresSurface surface = one_band_surface(ordered_scan(n));
+  const Level& base = surface.levels[0];
+  const Level& finest = surface.finest();
+  const double area = 4.0 * std::numbers::pi * std::numbers::pi * 0.4;
+  const std::vector<float> spacing(n, static_cast<float>(std::sqrt(area / items)));
+  const Vec3d origin = Vec3d::Zero();
+
+  Marks marks(n, 0);
+  paint(half(1.0), RegionKind::kZero, finest.position, finest.normal, origin, marks);
+  paint(half(-1.0), RegionKind::kOne, finest.position, finest.normal, origin, marks);
+  const PaintOperation brush{.shape = brush_stroke(), .steal = true};
+  report.time(name("paint"), "ms", items, [&] {
+    Marks painted = marks;
+    paint(brush, RegionKind::kOne, finest.position, finest.normal, origin, painted);
+    const RegionPair regions = regions_from_marks(base.position, spacing, painted, origin).value();
+    compute_scale_field(base.position, regions, Blend::kQuartic);
+  });
+
+  const RegionPair regions = regions_from_marks(base.position, spacing, marks, origin).value();
+  report.time(name("scale_field"), "ms", items,
+              [&] { compute_scale_field(base.position, regions, Blend::kQuartic); });
+
+  // Every sample moves: the field of a drag that holds next to nothing.
+  ScaleField field = compute_scale_field(base.position, regions, Blend::kQuartic);
+  for (std::size_t i = 0; i < n; ++i) field.t[i] = 0.5F + 0.5F * field.t[i];
+  const EditParams params{.deformation = Rotation{.axis = Vec3d(1.0, 2.0, 3.0), .angle_rad = 1.0}};
+  MultiresSurface edited;
+  report.time(name("edit.level0"), "ms", items, [&] { apply_edit(surface, params, field, origin, edited); });
+}
+
+void bench_region_query(BenchReport& report) {
+  if (!report.wants("region.query.50k")) return;
+  const Cloud cloud = ordered_scan(437'645);
+  Points centers(50'000);
+  for (std::size_t i = 0; i < centers.size(); ++i) centers.set(i, cloud.position[i * 8]);
+  const Region region(centers, std::vector<float>(centers.size(), 0.004F));
+  const auto queries = static_cast<double>(cloud.size());
+  // Coherent points a little way off the balls, so that no query ends early inside one.
+  Points queried(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) queried.set(i, 1.05F * cloud.position[i]);
+  report.time("region.query.50k", "us/point", queries, [&] {
+    std::uint32_t hint = 0;
+    for (std::size_t i = 0; i < queried.size(); ++i) static_cast<void>(region.distance(queried[i], hint));
+  });
+  report.time("region.query_many.50k", "us/point", queries, [&] {
+    RegionDistances distances;
+    region.distances(queried, 0, queried.size(), distances);
+  });
+}
+
+}  // namespace
+
+void bench_editing(BenchReport& report) {
+  bench_region_query(report);
+  for (const Size& size : {Size{"148k", 148'000}, Size{"437k", 437'645}, Size{"2m", 2'000'000}}) {
+    bench_size(report, size);
+  }
+}
+
+}  // namespace pointwright::bench
