@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "server/http/error_map.h"
+#include "server/http/problem_response.h"
 
 namespace pointwright::server {
 namespace {

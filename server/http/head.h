@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "server/http/message.h"
-#include "server/problem/problem.h"
+#include "server/http/problem_response.h"
 
 namespace pointwright::server {
 

@@ -1,0 +1,51 @@
+#include "server/config/limits.h"
+
+#include <array>
+
+namespace pointwright::server {
+namespace {
+
+constexpr std::uint64_t kTebi = 1ULL << 40U;
+
+constexpr std::array kTable = {
+    LimitInfo{"max_upload_bytes", &Limits::max_upload_bytes, 1, kTebi, "bytes of one uploaded file"},
+    LimitInfo{"max_samples", &Limits::max_samples, 1, 2'000'000'000, "samples of one cloud"},
+    LimitInfo{"max_clouds", &Limits::max_clouds, 1, 1'000'000, "clouds held at once"},
+    LimitInfo{"max_cloud_bytes", &Limits::max_cloud_bytes, 1, kTebi, "memory of all clouds together"},
+    LimitInfo{"max_sessions", &Limits::max_sessions, 1, 100'000, "sessions held at once"},
+    LimitInfo{"max_session_bytes", &Limits::max_session_bytes, 1, kTebi,
+              "memory of all sessions together, their histories included"},
+    LimitInfo{"history_bytes", &Limits::history_bytes, 1, kTebi,
+              "memory of one session's stored history states; others are replayed"},
+    LimitInfo{"max_edits", &Limits::max_edits, 1, 1'000'000, "edits in the history of one session"},
+    LimitInfo{"max_operations", &Limits::max_operations, 1, 10'000, "painting operations of one region"},
+    LimitInfo{"max_json_bytes", &Limits::max_json_bytes, 256, 64ULL << 20U, "bytes of a JSON body"},
+    LimitInfo{"max_json_depth", &Limits::max_json_depth, 8, 64, "nesting of a JSON body"},
+    LimitInfo{"max_connections", &Limits::max_connections, 8, 30'000, "connections served at once"},
+    LimitInfo{"max_streams", &Limits::max_streams, 1, 10'000, "streams open at once"},
+    LimitInfo{"max_decoders", &Limits::max_decoders, 1, 64, "uploads decoded at once"},
+    LimitInfo{"max_upload_memory", &Limits::max_upload_memory, 1, kTebi,
+              "bytes of all uploads that are being received or decoded"},
+    LimitInfo{"max_head_bytes", &Limits::max_head_bytes, 1024, 1U << 20U, "bytes of a request's head"},
+    LimitInfo{"max_headers", &Limits::max_headers, 8, 1000, "headers of a request"},
+    LimitInfo{"max_path_bytes", &Limits::max_path_bytes, 128, 8192, "bytes of a request's path"},
+    LimitInfo{"head_deadline_ms", &Limits::head_deadline_ms, 50, 600'000,
+              "time for a request's head to arrive"},
+    LimitInfo{"body_grace_ms", &Limits::body_grace_ms, 50, 3'600'000,
+              "time for a body to arrive, beyond its length at the least rate"},
+    LimitInfo{"least_body_rate", &Limits::least_body_rate, 1000, 1ULL << 40U,
+              "bytes a second that a body must make"},
+    LimitInfo{"stream_write_deadline_ms", &Limits::stream_write_deadline_ms, 50, 600'000,
+              "time for a stream's reader to take a piece"},
+    LimitInfo{"heartbeat_ms", &Limits::heartbeat_ms, 50, 60'000, "time between the heartbeats of a stream"},
+    LimitInfo{"shutdown_deadline_ms", &Limits::shutdown_deadline_ms, 100, 600'000,
+              "time for running requests to end when the daemon stops"},
+};
+
+}  // namespace
+
+std::span<const LimitInfo> limit_table() {
+  return kTable;
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,50 @@
+#pragma once
+// Every limit that the operator can set: one table, from which the command line, the environment, the file,
+// /v1/info and the documentation are made.
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace pointwright::server {
+
+struct Limits {
+  std::uint64_t max_upload_bytes = 1ULL << 30U;
+  std::uint64_t max_samples = 20'000'000;
+  std::uint64_t max_clouds = 64;
+  std::uint64_t max_cloud_bytes = 4ULL << 30U;
+  std::uint64_t max_sessions = 32;
+  std::uint64_t max_session_bytes = 8ULL << 30U;
+  std::uint64_t history_bytes = 512ULL << 20U;
+  std::uint64_t max_edits = 10'000;
+  std::uint64_t max_operations = 10'000;
+  std::uint64_t max_json_bytes = 8ULL << 20U;
+  std::uint64_t max_json_depth = 32;
+  std::uint64_t max_connections = 1024;
+  std::uint64_t max_streams = 64;
+  std::uint64_t max_decoders = 2;
+  std::uint64_t max_upload_memory = 2ULL << 30U;
+  std::uint64_t max_head_bytes = 32 * 1024;
+  std::uint64_t max_headers = 64;
+  std::uint64_t max_path_bytes = 512;
+  std::uint64_t head_deadline_ms = 5'000;
+  std::uint64_t body_grace_ms = 10'000;
+  std::uint64_t least_body_rate = 64 * 1024;
+  std::uint64_t stream_write_deadline_ms = 20'000;
+  std::uint64_t heartbeat_ms = 5'000;
+  std::uint64_t shutdown_deadline_ms = 8'000;
+  friend bool operator==(const Limits&, const Limits&) = default;
+};
+
+/// One row of the table.
+struct LimitInfo {
+  std::string_view name;  ///< as in Limits, in the file and in /v1/info; with dashes on the command line
+  std::uint64_t Limits::*member;
+  std::uint64_t least;
+  std::uint64_t greatest;
+  std::string_view meaning;
+};
+
+std::span<const LimitInfo> limit_table();
+
+}  // namespace pointwright::server

@@ -1,0 +1,158 @@
+#include "server/config/setting.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <stdexcept>
+
+namespace pointwright::server {
+namespace {
+
+std::uint64_t parse_number(const std::string& text, std::uint64_t least, std::uint64_t greatest) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || text.empty())
+    throw std::invalid_argument("\"" + text + "\" is not a whole number");
+  if (value < least || value > greatest)
+    throw std::invalid_argument(text + " is outside " + std::to_string(least) + " to " +
+                                std::to_string(greatest));
+  return value;
+}
+
+bool parse_flag(const std::string& text) {
+  if (text == "true" || text == "1") return true;
+  if (text == "false" || text == "0") return false;
+  throw std::invalid_argument("\"" + text + "\" is not true or false");
+}
+
+const std::string& single(const std::vector<std::string>& values) {
+  if (values.size() != 1) throw std::invalid_argument("exactly one value is expected");
+  return values.front();
+}
+
+SampleFile parse_sample(const std::string& text) {
+  const std::size_t equals = text.rfind('=');
+  SampleFile sample{.path = text.substr(0, equals), .name = {}};
+  if (equals != std::string::npos) sample.name = text.substr(equals + 1);
+  if (sample.path.empty() || (equals != std::string::npos && sample.name.empty()))
+    throw std::invalid_argument("\"" + text + "\" is not FILE or FILE=NAME");
+  if (sample.name.empty()) sample.name = sample.path.substr(sample.path.rfind('/') + 1);
+  return sample;
+}
+
+std::string parse_host_name(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool plain = !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '-' || c == '[' || c == ']' ||
+           c == ':';
+  });
+  if (!plain) throw std::invalid_argument("\"" + text + "\" is not a host name");
+  return text;
+}
+
+Setting text_setting(std::string_view key, std::string Config::*member, std::string_view meaning) {
+  return {.key = key,
+          .meaning = meaning,
+          .set = [member](Config& c, const std::vector<std::string>& v) { c.*member = single(v); },
+          .get = [member](const Config& c) { return std::vector<std::string>{c.*member}; }};
+}
+
+Setting limit_setting(const LimitInfo& info) {
+  return {.key = info.name,
+          .meaning = info.meaning,
+          .is_number = true,
+          .set =
+              [&info](Config& c, const std::vector<std::string>& v) {
+                c.limits.*info.member = parse_number(single(v), info.least, info.greatest);
+              },
+          .get =
+              [&info](const Config& c) {
+                return std::vector<std::string>{std::to_string(c.limits.*info.member)};
+              }};
+}
+
+Setting log_level_setting() {
+  Setting setting = text_setting("log_level", &Config::log_level, "trace, debug, info, warn, error or off");
+  setting.set = [](Config& c, const std::vector<std::string>& v) {
+    constexpr std::array<std::string_view, 6> kLevels = {"trace", "debug", "info", "warn", "error", "off"};
+    if (std::find(kLevels.begin(), kLevels.end(), single(v)) == kLevels.end())
+      throw std::invalid_argument("\"" + single(v) + "\" is not a log level");
+    c.log_level = single(v);
+  };
+  return setting;
+}
+
+Setting samples_setting() {
+  return {.key = "sample",
+          .meaning = "FILE or FILE=NAME to load as a cloud at start; may be given more than once",
+          .is_list = true,
+          .set =
+              [](Config& c, const std::vector<std::string>& v) {
+                c.samples.clear();
+                for (const std::string& text : v) c.samples.push_back(parse_sample(text));
+              },
+          .get =
+              [](const Config& c) {
+                std::vector<std::string> values;
+                for (const SampleFile& s : c.samples) values.push_back(s.path + "=" + s.name);
+                return values;
+              }};
+}
+
+Setting allowed_hosts_setting() {
+  return {.key = "allowed_hosts",
+          .meaning = "host name to answer for besides loopback's; may be given more than once",
+          .is_list = true,
+          .set =
+              [](Config& c, const std::vector<std::string>& v) {
+                c.allowed_hosts.clear();
+                for (const std::string& text : v) c.allowed_hosts.push_back(parse_host_name(text));
+              },
+          .get = [](const Config& c) { return c.allowed_hosts; }};
+}
+
+}  // namespace
+
+std::vector<Setting> all_settings() {
+  std::vector<Setting> settings = {
+      text_setting("host", &Config::host, "address to listen on"),
+      {.key = "port",
+       .meaning = "port to listen on; 0: any free one",
+       .is_number = true,
+       .set =
+           [](Config& c, const std::vector<std::string>& v) {
+             c.port = static_cast<std::uint16_t>(parse_number(single(v), 0, 65535));
+           },
+       .get = [](const Config& c) { return std::vector<std::string>{std::to_string(c.port)}; }},
+      text_setting("port_file", &Config::port_file, "file that gets the bound port once the daemon listens"),
+      {.key = "allow_remote",
+       .meaning =
+           "permit an address beyond loopback (behind a reverse proxy that does TLS and access control)",
+       .is_flag = true,
+       .set = [](Config& c, const std::vector<std::string>& v) { c.allow_remote = parse_flag(single(v)); },
+       .get = [](const Config& c) { return std::vector<std::string>{c.allow_remote ? "true" : "false"}; }},
+      allowed_hosts_setting(),
+      text_setting("web_root", &Config::web_root, "folder with the viewer's files"),
+      samples_setting(),
+      log_level_setting(),
+      text_setting("log_file", &Config::log_file, "file to log to; standard error where none is given"),
+      {.key = "threads",
+       .meaning = "threads for computing; 0: all of the machine's",
+       .is_number = true,
+       .set =
+           [](Config& c, const std::vector<std::string>& v) {
+             c.threads = static_cast<std::uint32_t>(parse_number(single(v), 0, 1024));
+           },
+       .get = [](const Config& c) { return std::vector<std::string>{std::to_string(c.threads)}; }},
+  };
+  for (const LimitInfo& info : limit_table()) settings.push_back(limit_setting(info));
+  return settings;
+}
+
+bool is_limit(std::string_view key) {
+  return std::any_of(limit_table().begin(), limit_table().end(),
+                     [&](const LimitInfo& i) { return i.name == key; });
+}
+
+}  // namespace pointwright::server

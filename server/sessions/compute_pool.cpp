@@ -1,0 +1,80 @@
+#include "server/sessions/compute_pool.h"
+
+#include "engine/core/parallel.h"
+
+namespace pointwright::server {
+
+ComputePool::ComputePool(std::size_t threads, int task_threads) : task_threads_(task_threads) {
+  for (std::size_t i = 0; i < threads; ++i) threads_.emplace_back([this] { run(); });
+}
+
+ComputePool::~ComputePool() {
+  std::deque<std::function<void()>> dropped;
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    dropped.swap(tasks_);
+  }
+  wake_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void ComputePool::post(std::function<void()> task) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (stopping_) return;  // the task is dropped, and with it its promise
+    tasks_.push_back(std::move(task));
+  }
+  wake_.notify_one();
+}
+
+void ComputePool::run() {
+  while (true) {
+    std::function<void()> task;
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait(lock, [this] { return stopping_ || !tasks_.empty(); });
+      if (stopping_) return;
+      task = std::move(tasks_.front());
+      tasks_.pop_front();
+    }
+    with_threads(task_threads_, task);
+  }
+}
+
+void Strand::post(std::function<void()> task) {
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->tasks.push_back(std::move(task));
+    if (state_->running) return;
+    state_->running = true;
+  }
+  state_->pool.post([state = state_] { run_one(state); });
+}
+
+bool Strand::is_idle_behind() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->tasks.empty();
+}
+
+void Strand::run_one(const std::shared_ptr<State>& state) {
+  std::function<void()> task;
+  {
+    const std::lock_guard lock(state->mutex);
+    task = std::move(state->tasks.front());
+    state->tasks.pop_front();
+  }
+  task();
+  task = nullptr;  // what it holds is let go before the next one starts
+  {
+    const std::lock_guard lock(state->mutex);
+    if (state->tasks.empty()) {
+      state->running = false;
+      return;
+    }
+  }
+  // One task at a time through the pool: busy sessions take turns.
+  state->pool.post([state] { run_one(state); });
+}
+
+}  // namespace pointwright::server

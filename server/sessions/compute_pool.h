@@ -1,0 +1,81 @@
+#pragma once
+// Where the computing happens: never on HTTP threads. A pool of threads, and strands that run one task at a
+// time.
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <vector>
+
+namespace pointwright::server {
+
+/// A fixed number of threads that take tasks in order. Thread-safe. The destructor ends the running tasks'
+/// threads after they return and drops the waiting ones (their futures then throw std::future_error).
+class ComputePool {
+ public:
+  /// `task_threads`: threads that each task's parallel loops may use; 0: all of the machine's.
+  ComputePool(std::size_t threads, int task_threads);
+  ~ComputePool();
+  ComputePool(const ComputePool&) = delete;
+  ComputePool& operator=(const ComputePool&) = delete;
+
+  /// Tasks must not throw.
+  void post(std::function<void()> task);
+
+  /// Runs `work` and hands its result, or its exception, to the future.
+  template <typename Work>
+  std::future<std::invoke_result_t<Work>> submit(Work work) {
+    auto task = std::make_shared<std::packaged_task<std::invoke_result_t<Work>()>>(std::move(work));
+    auto future = task->get_future();
+    post([task] { (*task)(); });
+    return future;
+  }
+
+ private:
+  void run();
+
+  int task_threads_;
+  std::mutex mutex_;  // guards tasks_ and stopping_
+  std::condition_variable wake_;
+  std::deque<std::function<void()>> tasks_;
+  bool stopping_ = false;
+  std::vector<std::thread> threads_;
+};
+
+/// Runs its tasks on the pool, one after the other, in the order in which they were posted. Thread-safe.
+/// Tasks that still wait when the strand is destroyed run nevertheless (they keep its state alive).
+class Strand {
+ public:
+  explicit Strand(ComputePool& pool) : state_(std::make_shared<State>(pool)) {}
+
+  void post(std::function<void()> task);
+  template <typename Work>
+  std::future<std::invoke_result_t<Work>> submit(Work work) {
+    auto task = std::make_shared<std::packaged_task<std::invoke_result_t<Work>()>>(std::move(work));
+    auto future = task->get_future();
+    post([task] { (*task)(); });
+    return future;
+  }
+  /// Whether nothing waits behind the running task.
+  [[nodiscard]] bool is_idle_behind() const;
+
+ private:
+  struct State {
+    explicit State(ComputePool& owner) : pool(owner) {}
+    ComputePool& pool;
+    mutable std::mutex mutex;  // guards tasks and running
+    std::deque<std::function<void()>> tasks;
+    bool running = false;
+  };
+  static void run_one(const std::shared_ptr<State>& state);
+
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace pointwright::server

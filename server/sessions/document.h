@@ -1,0 +1,41 @@
+#pragma once
+// A session's state at one revision: immutable, shared by everyone who reads it.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "engine/editing/painting.h"
+#include "protocol/json/documents.h"
+#include "server/sessions/history.h"
+#include "server/sessions/surface_state.h"
+
+namespace pointwright::server {
+
+/// One region as it was painted.
+struct Painting {
+  std::size_t samples = 0;
+  std::shared_ptr<const std::vector<PaintOperation>> operations;
+};
+
+struct Document {
+  protocol::SessionState state = protocol::SessionState::kBuilding;
+  std::optional<protocol::Problem> error = std::nullopt;  ///< kFailed: why
+  std::uint64_t revision = 0;  ///< grows with each region change, edit and head move
+  SurfaceState surface = {};   ///< the committed one; null while building
+  std::shared_ptr<const Marks> marks = {};
+  Painting zero = {};
+  Painting one = {};
+  std::shared_ptr<const EditList> edits = {};  ///< the undone ones included
+  std::size_t head = 0;                        ///< edits that are applied
+  protocol::ModelBounds bounds = {};           ///< of the committed surface
+
+  [[nodiscard]] const Painting& painting(RegionKind kind) const {
+    return kind == RegionKind::kZero ? zero : one;
+  }
+};
+
+using SharedDocument = std::shared_ptr<const Document>;
+
+}  // namespace pointwright::server

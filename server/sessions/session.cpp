@@ -1,0 +1,360 @@
+#include "server/sessions/session.h"
+
+#include <algorithm>
+
+#include "engine/core/parallel.h"
+
+namespace pointwright::server {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+using SteadyClock = std::chrono::steady_clock;
+
+namespace {
+
+/// Requests of one drag travel on connections of their own and may overtake each other; older than this, a
+/// lower number is another drag's.
+constexpr std::chrono::seconds kReorderWindow{1};
+
+protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) {
+  const Box3f box = bounds_of(position);
+  if (box.is_empty()) return {.min = origin, .max = origin};
+  return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
+}
+
+double median_of(std::vector<float> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+float detail_range_of(const SurfaceState& state) {
+  float range = 0.0F;
+  for (const DecompositionReport& report : *state.reports) range = std::max(range, report.max_detail);
+  return range;
+}
+
+}  // namespace
+
+Session::Session(SessionParams params, SessionServices services)
+    : params_(std::move(params)),
+      services_(std::move(services)),
+      strand_(services_.interactive),
+      display_(params_.cloud),
+      document_(std::make_shared<const Document>(
+          Document{.bounds = model_bounds(params_.cloud->position, params_.cloud->origin)})) {
+  rest_ = RestModel{.cloud = params_.cloud,
+                    .params = params_.hierarchy,
+                    .diagonal = bounds_of(params_.cloud->position).diagonal(),
+                    .spacing = {},
+                    .build = services_.build};
+}
+
+std::shared_ptr<Session> Session::create(SessionParams params, SessionServices services) {
+  std::shared_ptr<Session> session(new Session(std::move(params), std::move(services)));
+  session->services_.background.post([session] { session->build(); });
+  return session;
+}
+
+void Session::build() {
+  const auto begin = SteadyClock::now();
+  Result<Hierarchy> built = [&]() -> Result<Hierarchy> {
+    try {
+      return rest_.build(*params_.cloud, params_.hierarchy, context_);
+    } catch (const std::bad_alloc&) {
+      return Error{.code = ErrorCode::kTooLarge,
+                   .message = "the server has no memory for this hierarchy",
+                   .field = {}};
+    }
+  }();
+  note_time("build", begin);
+  strand_.post([self = shared_from_this(), built = std::make_shared<Result<Hierarchy>>(std::move(built))] {
+    self->finish_building(std::move(*built));
+  });
+}
+
+void Session::finish_building(Result<Hierarchy> built) {
+  Document document = *this->document();
+  if (!built) {
+    document.state = protocol::SessionState::kFailed;
+    document.error = protocol::to_problem(built.error());
+    publish(std::move(document));
+    return;
+  }
+  Hierarchy hierarchy = std::move(built).value();
+  rest_.spacing = std::move(hierarchy.spacing);
+  median_spacing_ = median_of(rest_.spacing);
+  SurfaceState state{
+      .surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
+      .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),
+      .first_valid_level = 0};
+  history_.emplace(state, params_.history_bytes,
+                   [this](const SurfaceState& before, const RecordedEdit& record) {
+                     return replayed(rest_, before, record, context_);
+                   });
+  document.state = protocol::SessionState::kReady;
+  document.surface = std::move(state);
+  document.marks = std::make_shared<const Marks>(params_.cloud->size(), std::uint8_t{0});
+  const auto no_operations = std::make_shared<const std::vector<PaintOperation>>();
+  document.zero.operations = document.one.operations = no_operations;
+  document.edits = std::make_shared<const EditList>();
+  context_.begin_phase("ready", 1.0);
+  publish(std::move(document));
+  show_committed();
+}
+
+void Session::publish(Document document) {
+  {
+    const std::lock_guard lock(document_mutex_);
+    document_ = std::make_shared<const Document>(std::move(document));
+  }
+  feed_.notify();
+}
+
+SharedDocument Session::document() const {
+  const std::lock_guard lock(document_mutex_);
+  return document_;
+}
+
+void Session::note_time(const std::string& name, SteadyClock::time_point begin) {
+  const double ms = std::chrono::duration<double, std::milli>(SteadyClock::now() - begin).count();
+  const std::lock_guard lock(document_mutex_);
+  timings_[name] = ms;
+}
+
+protocol::SessionDocument Session::describe(const Document& document) const {
+  protocol::SessionDocument result;
+  result.summary = {.id = params_.id,
+                    .name = params_.name,
+                    .cloud = params_.cloud_id,
+                    .state = document.state,
+                    .revision = document.revision,
+                    .created = created_,
+                    .sample_count = params_.cloud->size()};
+  result.progress = context_.progress();
+  result.error = document.error;
+  result.origin = params_.cloud->origin;
+  result.bounds = document.bounds;
+  for (const float scale : params_.hierarchy.scales)
+    result.level_scales.push_back(static_cast<double>(scale) * static_cast<double>(rest_.diagonal));
+  result.level_scales.push_back(0.0);
+  if (document.state == protocol::SessionState::kReady) {
+    result.spacing = median_spacing_;
+    result.decomposition = *document.surface.reports;
+    result.zero = {.samples = document.zero.samples, .operations = document.zero.operations->size()};
+    result.one = {.samples = document.one.samples, .operations = document.one.operations->size()};
+    result.head = static_cast<std::uint32_t>(document.head);
+    result.edits = static_cast<std::uint32_t>(document.edits->size());
+  }
+  const std::lock_guard lock(document_mutex_);
+  result.timings_ms.assign(timings_.begin(), timings_.end());
+  return result;
+}
+
+void Session::close(std::string reason) {
+  {
+    const std::lock_guard lock(document_mutex_);
+    if (closed_) return;
+    closed_ = std::move(reason);
+  }
+  context_.cancel();
+  feed_.notify();
+}
+
+std::optional<std::string> Session::closed_reason() const {
+  const std::lock_guard lock(document_mutex_);
+  return closed_;
+}
+
+Outcome<Done> Session::check_open() const {
+  if (closed_reason()) return Problem{.kind = ProblemKind::kNotFound, .detail = "the session was deleted"};
+  return Done{};
+}
+
+Outcome<SharedDocument> Session::ready_document() const {
+  if (auto open = check_open(); !open.ok()) return open.problem();
+  SharedDocument now = document();
+  if (now->state == protocol::SessionState::kBuilding)
+    return Problem{.kind = ProblemKind::kWrongState, .detail = "the session is still building"};
+  if (now->state == protocol::SessionState::kFailed)
+    return Problem{.kind = ProblemKind::kWrongState,
+                   .detail = "the session could not be built: " + now->error->detail};
+  return now;
+}
+
+void Session::show_committed() {
+  const SharedDocument now = document();
+  shows_preview_ = false;
+  display_.publish({.surface = now->surface.surface,
+                    .field = shown_field_,
+                    .marks = now->marks,
+                    .detail_range = detail_range_of(now->surface),
+                    .revision = now->revision,
+                    .sequence = 0});
+  feed_.notify();
+}
+
+Outcome<Done> Session::ensure_level(std::uint32_t level) {
+  Document document = *this->document();
+  if (level >= document.surface.first_valid_level) return Done{};
+  const auto begin = SteadyClock::now();
+  auto state = with_valid_level(rest_, document.surface, level, context_);
+  if (!state) return protocol::to_problem(state.error());
+  note_time("derive_levels", begin);
+  document.surface = std::move(state).value();
+  history_->replace_current(document.surface);
+  publish(std::move(document));
+  return Done{};
+}
+
+Outcome<Session::SharedField> Session::ensure_field(std::uint32_t level, Blend blend) {
+  if (auto done = ensure_level(level); !done.ok()) return done.problem();
+  const SharedDocument now = document();
+  const FieldKey key{.surface = now->surface.surface, .marks = now->marks, .level = level, .blend = blend};
+  active_level_ = level;
+  if (field_key_ != key) {
+    const auto begin = SteadyClock::now();
+    auto field = field_of(rest_, now->surface, level, blend, *now->marks);
+    note_time("field", begin);
+    const std::lock_guard lock(field_mutex_);
+    field_key_ = key;
+    field_ = field.ok() ? field.value() : nullptr;
+    field_problem_ = field.ok() ? std::nullopt : std::optional<Problem>(protocol::to_problem(field.error()));
+  }
+  shown_field_ = field_;
+  if (field_problem_) return *field_problem_;
+  return field_;
+}
+
+std::optional<Outcome<Done>> Session::known_verdict(const Document& document,
+                                                    const EditParams& params) const {
+  const FieldKey key{.surface = document.surface.surface,
+                     .marks = document.marks,
+                     .level = params.level,
+                     .blend = params.blend};
+  const std::lock_guard lock(field_mutex_);
+  if (field_key_ != key) return std::nullopt;
+  if (field_problem_) return Outcome<Done>(*field_problem_);
+  return Outcome<Done>(Done{});
+}
+
+void Session::schedule_field() {
+  if (field_scheduled_.exchange(true)) return;
+  strand_.post([self = shared_from_this()] { self->refresh_field(); });
+}
+
+void Session::refresh_field() {
+  field_scheduled_ = false;
+  if (closed_reason()) return;
+  // t for viewers is not urgent: whatever else was asked for goes first.
+  if (!strand_.is_idle_behind()) return schedule_field();
+  const SharedDocument now = document();
+  const SharedField before = shown_field_;
+  if (now->zero.samples > 0 && now->one.samples > 0) {
+    (void)ensure_field(std::max(active_level_, now->surface.first_valid_level), Blend::kQuartic);
+  } else {
+    shown_field_ = nullptr;
+  }
+  if (shown_field_ != before && !shows_preview_) show_committed();
+}
+
+Outcome<SurfaceState> Session::compute(const EditParams& params) {
+  auto field = ensure_field(params.level, params.blend);
+  if (!field.ok()) return field.problem();
+  const SharedDocument now = document();
+  if (last_preview_ && last_preview_->base == *field_key_ && same_params(last_preview_->params, params))
+    return last_preview_->after;
+  const auto begin = SteadyClock::now();
+  SurfaceState after = edited(rest_, now->surface, params, *field.value());
+  note_time("edit", begin);
+  last_preview_ = LastPreview{.base = *field_key_, .params = params, .after = after};
+  return after;
+}
+
+Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  if (auto valid = validate(request.edit, *ready.value()->surface.surface); !valid)
+    return protocol::to_problem(valid.error());
+  auto verdict = known_verdict(*ready.value(), request.edit);
+  if (!verdict)
+    verdict = on_strand([this, &request]() -> Outcome<Done> {
+      auto field = ensure_field(request.edit.level, request.edit.blend);
+      if (!field.ok()) return field.problem();
+      return Done{};
+    });
+  if (!verdict->ok()) return *verdict;
+  const std::lock_guard lock(preview_mutex_);
+  const auto now = SteadyClock::now();
+  if (request.sequence <= newest_sequence_ && now - newest_sequence_time_ < kReorderWindow) return Done{};
+  newest_sequence_ = request.sequence;
+  newest_sequence_time_ = now;
+  pending_preview_ = request;
+  if (!preview_scheduled_) {
+    preview_scheduled_ = true;
+    strand_.post([self = shared_from_this()] { self->run_preview(); });
+  }
+  return Done{};
+}
+
+void Session::run_preview() {
+  std::optional<protocol::PreviewRequest> request;
+  {
+    const std::lock_guard lock(preview_mutex_);
+    request.swap(pending_preview_);
+    preview_scheduled_ = false;
+  }
+  if (!request || closed_reason()) return;
+  const auto begin = SteadyClock::now();
+  const auto after = compute(request->edit);
+  if (!after.ok()) return;  // the regions were repainted meanwhile: the next preview is told so
+  const SharedDocument now = document();
+  shows_preview_ = true;
+  display_.publish({.surface = after.value().surface,
+                    .field = shown_field_,
+                    .marks = now->marks,
+                    .detail_range = detail_range_of(after.value()),
+                    .revision = now->revision,
+                    .sequence = request->sequence});
+  note_time("preview", begin);
+  feed_.notify();
+}
+
+Outcome<SharedFrame> Session::render_preview(const protocol::PreviewRequest& request,
+                                             std::uint16_t attributes) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this]() -> Outcome<SharedFrame> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    const SharedDocument now = document();
+    if (auto valid = validate(request.edit, *now->surface.surface); !valid)
+      return protocol::to_problem(valid.error());
+    const auto after = compute(request.edit);
+    if (!after.ok()) return after.problem();
+    const Picture picture{.surface = after.value().surface,
+                          .field = field_,
+                          .marks = now->marks,
+                          .detail_range = detail_range_of(after.value()),
+                          .revision = now->revision,
+                          .sequence = request.sequence};
+    const auto finest = static_cast<std::uint32_t>(picture.surface->band_count());
+    return encode_picture(display_.layout(), picture, *params_.cloud, finest, attributes);
+  });
+}
+
+Outcome<Done> Session::end_preview() {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  {
+    const std::lock_guard lock(preview_mutex_);
+    pending_preview_.reset();
+    newest_sequence_time_ = SteadyClock::now();
+  }
+  return on_strand([this]() -> Outcome<Done> {
+    if (shows_preview_) show_committed();
+    return Done{};
+  });
+}
+
+}  // namespace pointwright::server

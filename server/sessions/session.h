@@ -1,0 +1,179 @@
+#pragma once
+// One session: a cloud, its hierarchy, two painted regions, a history of edits, and what is shown of them.
+
+#include <atomic>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "server/problem/outcome.h"
+#include "server/sessions/compute_pool.h"
+#include "server/sessions/display.h"
+#include "server/sessions/document.h"
+#include "server/sessions/feed.h"
+
+namespace pointwright::server {
+
+/// What a session is made from.
+struct SessionParams {
+  std::string id;
+  std::string name;
+  std::string cloud_id;
+  std::shared_ptr<const Cloud> cloud;
+  HierarchyParams hierarchy;
+  std::uint64_t history_bytes = 0;
+  std::size_t max_edits = 0;
+  std::size_t max_operations = 0;
+};
+
+/// What a session computes with. `background` takes what lasts for seconds, `interactive` what a hand waits
+/// for.
+struct SessionServices {
+  ComputePool& interactive;
+  ComputePool& background;
+  HierarchyBuilder build;
+};
+
+/// All public methods are thread-safe. Changes run one after the other on the session's strand, and the
+/// methods that ask for them block until they are done: HTTP threads call them. Readers take the newest
+/// Document and never wait.
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  /// Makes the session and starts building its hierarchy.
+  static std::shared_ptr<Session> create(SessionParams params, SessionServices services);
+
+  [[nodiscard]] const std::string& id() const { return params_.id; }
+  [[nodiscard]] const std::string& cloud_id() const { return params_.cloud_id; }
+  [[nodiscard]] const Cloud& cloud() const { return *params_.cloud; }
+  [[nodiscard]] SharedDocument document() const;
+  [[nodiscard]] protocol::SessionDocument describe(const Document& document) const;
+  [[nodiscard]] Progress progress() const { return context_.progress(); }
+
+  struct Painted {
+    SharedDocument document;
+    std::size_t changed = 0;  ///< samples that joined or left a region
+  };
+  /// Appends one operation to a region's painting. Problems: wrong state, too many operations.
+  Outcome<Painted> paint(RegionKind kind, const PaintOperation& operation);
+  /// Replaces a region's whole painting; none: clears it.
+  Outcome<Painted> replace_painting(RegionKind kind, std::vector<PaintOperation> operations);
+
+  /// Asks for a preview to be shown. Returns once it is known to be possible; it is computed afterwards,
+  /// unless a newer one replaces it before. Problems: wrong state, invalid edits, regions that are empty or
+  /// meet.
+  Outcome<Done> put_preview(const protocol::PreviewRequest& request);
+  /// Computes a preview's key frame without showing it to anyone.
+  Outcome<SharedFrame> render_preview(const protocol::PreviewRequest& request, std::uint16_t attributes);
+  /// Ends the drag: the committed state is shown again.
+  Outcome<Done> end_preview();
+
+  struct Committed {
+    SharedDocument document;
+    std::shared_ptr<const RecordedEdit> record;
+  };
+  /// Records an edit on top of `revision`. Problems: those of put_preview, a stale revision, too many edits.
+  Outcome<Committed> commit(const EditParams& params, std::uint64_t revision);
+  /// Undo, redo, jump: keeps the first `edit` edits applied.
+  Outcome<SharedDocument> move_head(std::size_t edit);
+
+  /// The committed state with `level` valid; with t where the regions allow it.
+  Outcome<Picture> committed_picture(std::uint32_t level, bool with_t);
+  /// The cloud as edited: the upload's columns in coherent order, moved samples at their new places on
+  /// `level`.
+  Outcome<std::shared_ptr<const Cloud>> edited_cloud(std::uint32_t level);
+
+  [[nodiscard]] Display& display() { return display_; }
+  [[nodiscard]] Feed& feed() { return feed_; }
+
+  /// Ends the session: building is cancelled, streams end with the reason, changes are refused.
+  void close(std::string reason);
+  [[nodiscard]] std::optional<std::string> closed_reason() const;
+
+ private:
+  struct FieldKey {
+    std::shared_ptr<const MultiresSurface> surface;
+    std::shared_ptr<const Marks> marks;
+    std::uint32_t level = 0;
+    Blend blend = Blend::kQuartic;
+    friend bool operator==(const FieldKey&, const FieldKey&) = default;
+  };
+  using SharedField = std::shared_ptr<const ScaleField>;
+
+  Session(SessionParams params, SessionServices services);
+
+  // Everything below runs on the strand, except where it says otherwise.
+  void build();  // on the background pool
+  void finish_building(Result<Hierarchy> built);
+  void publish(Document document);
+  void show_committed();
+  void run_preview();
+  void schedule_field();
+  void refresh_field();
+  Outcome<Done> check_open() const;
+  Outcome<SharedField> ensure_field(std::uint32_t level, Blend blend);
+  Outcome<Done> ensure_level(std::uint32_t level);
+  Outcome<SurfaceState> compute(const EditParams& params);
+  Outcome<Painted> repaint(RegionKind kind, std::vector<PaintOperation> operations, bool append);
+  [[nodiscard]] std::optional<Outcome<Done>> known_verdict(const Document& document,
+                                                           const EditParams& params) const;
+  Outcome<SharedDocument> ready_document() const;  // any thread
+  void note_time(const std::string& name, std::chrono::steady_clock::time_point begin);
+  /// Runs work on the strand and waits for it. Any thread but the pool's.
+  template <typename Work>
+  auto on_strand(Work work) -> decltype(work()) {
+    try {
+      return strand_.submit(std::move(work)).get();
+    } catch (const std::future_error&) {
+      // The pool was stopped with the task in it.
+      return protocol::Problem{.kind = protocol::ProblemKind::kOverloaded,
+                               .detail = "the server is stopping"};
+    }
+  }
+
+  const SessionParams params_;
+  const SessionServices services_;
+  const protocol::TimePoint created_ = std::chrono::system_clock::now();
+  ExecutionContext context_;
+  Strand strand_;
+  Display display_;
+  Feed feed_;
+
+  mutable std::mutex document_mutex_;  // guards document_, timings_ and closed_
+  SharedDocument document_;
+  std::map<std::string, double> timings_;
+  std::optional<std::string> closed_;
+
+  // Written once by finish_building(), before the document says that the session is ready.
+  RestModel rest_;
+  double median_spacing_ = 0.0;
+
+  // The strand's own.
+  std::optional<History> history_;
+  SharedField shown_field_;
+  std::uint32_t active_level_ = 0;
+  bool shows_preview_ = false;
+  struct LastPreview {
+    FieldKey base;
+    EditParams params;
+    SurfaceState after;
+  };
+  std::optional<LastPreview> last_preview_;
+
+  mutable std::mutex
+      field_mutex_;  // guards field_key_, field_problem_ and field_ (written on the strand only)
+  std::optional<FieldKey> field_key_;
+  std::optional<protocol::Problem> field_problem_;
+  SharedField field_;
+  std::atomic<bool> field_scheduled_{false};
+
+  std::mutex preview_mutex_;  // guards the pending preview
+  std::optional<protocol::PreviewRequest> pending_preview_;
+  bool preview_scheduled_ = false;
+  std::uint64_t newest_sequence_ = 0;
+  std::chrono::steady_clock::time_point newest_sequence_time_;
+};
+
+}  // namespace pointwright::server

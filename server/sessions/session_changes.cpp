@@ -1,0 +1,197 @@
+// The recorded changes of a session: painting, edits, and moves of the head.
+
+#include <algorithm>
+
+#include "engine/core/parallel.h"
+#include "server/sessions/session.h"
+
+namespace pointwright::server {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+using SteadyClock = std::chrono::steady_clock;
+
+namespace {
+
+protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) {
+  const Box3f box = bounds_of(position);
+  return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
+}
+
+}  // namespace
+
+Outcome<Session::Painted> Session::paint(RegionKind kind, const PaintOperation& operation) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this] { return repaint(kind, {operation}, true); });
+}
+
+Outcome<Session::Painted> Session::replace_painting(RegionKind kind, std::vector<PaintOperation> operations) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this] { return repaint(kind, std::move(operations), false); });
+}
+
+Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOperation> operations,
+                                           bool append) {
+  if (auto open = check_open(); !open.ok()) return open.problem();
+  const auto begin = SteadyClock::now();
+  const SharedDocument before = document();
+  const Painting& painting = before->painting(kind);
+  const std::size_t kept = append ? painting.operations->size() : 0;
+  if (kept + operations.size() > params_.max_operations)
+    return Problem{.kind = ProblemKind::kTooMany,
+                   .detail = "the region has as many operations as a painting may have",
+                   .limit = static_cast<double>(params_.max_operations),
+                   .actual = static_cast<double>(kept + operations.size())};
+  auto marks = std::make_shared<Marks>(*before->marks);
+  if (!append)
+    for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
+  const Level& finest = before->surface.surface->finest();
+  for (const PaintOperation& operation : operations)
+    pointwright::paint(operation, kind, finest.position, finest.normal, params_.cloud->origin, *marks);
+  Painted result;
+  for (std::size_t i = 0; i < marks->size(); ++i)
+    if ((*marks)[i] != (*before->marks)[i]) ++result.changed;
+
+  Document after = *before;
+  auto list = std::make_shared<std::vector<PaintOperation>>();
+  if (append) *list = *painting.operations;
+  list->insert(list->end(), std::make_move_iterator(operations.begin()),
+               std::make_move_iterator(operations.end()));
+  (kind == RegionKind::kZero ? after.zero : after.one).operations = std::move(list);
+  after.zero.samples = count_marked(*marks, RegionKind::kZero);
+  after.one.samples = count_marked(*marks, RegionKind::kOne);
+  after.marks = std::move(marks);
+  ++after.revision;
+  publish(std::move(after));
+  note_time("paint", begin);
+  show_committed();
+  schedule_field();
+  result.document = document();
+  return result;
+}
+
+Outcome<Session::Committed> Session::commit(const EditParams& params, std::uint64_t revision) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this]() -> Outcome<Committed> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    const SharedDocument before = document();
+    if (before->revision != revision)
+      return Problem{.kind = ProblemKind::kStaleRevision,
+                     .detail = "the session is at revision " + std::to_string(before->revision) + ", not " +
+                               std::to_string(revision),
+                     .revision = before->revision};
+    if (before->head >= params_.max_edits)
+      return Problem{.kind = ProblemKind::kTooMany,
+                     .detail = "the history holds as many edits as it may",
+                     .limit = static_cast<double>(params_.max_edits)};
+    if (auto valid = validate(params, *before->surface.surface); !valid)
+      return protocol::to_problem(valid.error());
+    const auto begin = SteadyClock::now();
+    const auto computed = compute(params);
+    if (!computed.ok()) return computed.problem();
+    last_preview_.reset();
+    auto record = std::make_shared<RecordedEdit>();
+    record->index = before->head + 1;
+    record->params = params;
+    record->marks = before->marks;
+    record->created = std::chrono::system_clock::now();
+    record->moved_samples = count_moved(*before->surface.surface, *computed.value().surface);
+    record->zero_samples = before->zero.samples;
+    record->one_samples = before->one.samples;
+    history_->push(record, computed.value());
+
+    Document after = *document();  // with the levels that computing may have derived
+    after.surface = computed.value();
+    after.edits = std::make_shared<const EditList>(history_->edits());
+    after.head = history_->head();
+    after.bounds = model_bounds(after.surface.surface->finest().position, params_.cloud->origin);
+    ++after.revision;
+    publish(std::move(after));
+    note_time("commit", begin);
+    {
+      const std::lock_guard lock(preview_mutex_);
+      pending_preview_.reset();
+      newest_sequence_time_ = SteadyClock::now();
+    }
+    show_committed();
+    schedule_field();
+    return Committed{.document = document(), .record = record};
+  });
+}
+
+Outcome<SharedDocument> Session::move_head(std::size_t edit) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this]() -> Outcome<SharedDocument> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    const SharedDocument before = document();
+    if (edit > before->edits->size())
+      return Problem{.kind = ProblemKind::kInvalidValue,
+                     .detail = "the history has no such edit",
+                     .errors = {{.pointer = "/edit", .detail = "beyond the last edit of the history"}},
+                     .limit = static_cast<double>(before->edits->size()),
+                     .actual = static_cast<double>(edit)};
+    if (edit == before->head) return before;  // idempotent
+    const auto begin = SteadyClock::now();
+    if (auto moved = history_->move_head(edit); !moved) return protocol::to_problem(moved.error());
+    Document after = *before;
+    after.surface = history_->current();
+    after.head = edit;
+    after.bounds = model_bounds(after.surface.surface->finest().position, params_.cloud->origin);
+    ++after.revision;
+    publish(std::move(after));
+    note_time("move_head", begin);
+    show_committed();
+    schedule_field();
+    return document();
+  });
+}
+
+Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this]() -> Outcome<Picture> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    if (auto done = ensure_level(level); !done.ok()) return done.problem();
+    std::shared_ptr<const ScaleField> field;
+    if (with_t) {
+      auto made =
+          ensure_field(std::max(active_level_, document()->surface.first_valid_level), Blend::kQuartic);
+      if (made.ok()) field = made.value();  // without usable regions t is 0 everywhere
+    }
+    const SharedDocument now = document();
+    float range = 0.0F;
+    for (const DecompositionReport& report : *now->surface.reports)
+      range = std::max(range, report.max_detail);
+    return Picture{.surface = now->surface.surface,
+                   .field = std::move(field),
+                   .marks = now->marks,
+                   .detail_range = range,
+                   .revision = now->revision,
+                   .sequence = 0};
+  });
+}
+
+Outcome<std::shared_ptr<const Cloud>> Session::edited_cloud(std::uint32_t level) {
+  auto picture = committed_picture(level, false);
+  if (!picture.ok()) return picture.problem();
+  const Level& now = picture.value().surface->levels[level];
+  auto cloud = std::make_shared<Cloud>(*params_.cloud);
+  parallel_for(cloud->size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      // What no edit moved leaves with the very bits it came with.
+      if (!cloud->exact_position.empty() && now.position[i] != params_.cloud->position[i]) {
+        const Vec3d place = cloud->origin + now.position[i].cast<double>();
+        cloud->exact_position[i] = {place.x(), place.y(), place.z()};
+      }
+    }
+  });
+  cloud->position = now.position;
+  cloud->normal = now.normal;
+  return std::shared_ptr<const Cloud>(std::move(cloud));
+}
+
+}  // namespace pointwright::server

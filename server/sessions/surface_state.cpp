@@ -1,0 +1,87 @@
+#include "server/sessions/surface_state.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "engine/core/parallel.h"
+#include "engine/editing/region.h"
+
+namespace pointwright::server {
+
+std::uint64_t memory_of(const SurfaceState& state) {
+  if (state.surface == nullptr) return 0;
+  const std::uint64_t levels = state.surface->levels.size();
+  const std::uint64_t bands = state.surface->band_count();
+  return state.surface->sample_count() * sizeof(float) * (levels * 6 + bands);
+}
+
+Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState& state, std::uint32_t level,
+                                      const ExecutionContext& context) {
+  if (level >= state.first_valid_level) return state;
+  Cloud current = *rest.cloud;
+  current.position = state.surface->finest().position;
+  current.normal = state.surface->finest().normal;
+  current.exact_position.clear();
+  current.position_is_double = false;
+  // The scales are lengths of the model, not of whatever box the edited surface happens to fill.
+  HierarchyParams params = rest.params;
+  const float diagonal = bounds_of(current.position).diagonal();
+  if (diagonal > 0.0F)
+    for (float& scale : params.scales) scale = std::min(scale * (rest.diagonal / diagonal), 0.2F);
+  auto built = rest.build(current, params, context);
+  if (!built) return built.error();
+  auto surface = std::make_shared<MultiresSurface>(std::move(built.value().surface));
+  surface->levels.back() = state.surface->finest();
+  return SurfaceState{
+      .surface = std::move(surface),
+      .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(built.value().reports)),
+      .first_valid_level = 0};
+}
+
+Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const SurfaceState& state,
+                                                   std::uint32_t level, Blend blend, const Marks& marks) {
+  const Points& position = state.surface->levels[level].position;
+  auto regions = regions_from_marks(position, rest.spacing, marks, rest.cloud->origin);
+  if (!regions) return regions.error();
+  return std::make_shared<const ScaleField>(compute_scale_field(position, regions.value(), blend));
+}
+
+SurfaceState edited(const RestModel& rest, const SurfaceState& state, const EditParams& params,
+                    const ScaleField& field) {
+  return SurfaceState{.surface = std::make_shared<const MultiresSurface>(
+                          apply_edit(*state.surface, params, field, rest.cloud->origin)),
+                      .reports = state.reports,
+                      .first_valid_level = std::max(state.first_valid_level, params.level)};
+}
+
+Result<SurfaceState> replayed(const RestModel& rest, const SurfaceState& before, const RecordedEdit& record,
+                              const ExecutionContext& context) {
+  auto state = with_valid_level(rest, before, record.params.level, context);
+  if (!state) return state.error();
+  auto field = field_of(rest, state.value(), record.params.level, record.params.blend, *record.marks);
+  if (!field) return field.error();
+  return edited(rest, state.value(), record.params, *field.value());
+}
+
+std::size_t count_moved(const MultiresSurface& before, const MultiresSurface& after) {
+  const Level& a = before.finest();
+  const Level& b = after.finest();
+  return parallel_sum<std::size_t>(a.position.size(), 0, [&](std::size_t begin, std::size_t end) {
+    std::size_t moved = 0;
+    for (std::size_t i = begin; i < end; ++i)
+      if (a.position[i] != b.position[i] || a.normal[i] != b.normal[i]) ++moved;
+    return moved;
+  });
+}
+
+bool same_params(const EditParams& a, const EditParams& b) {
+  if (a.level != b.level || a.blend != b.blend || a.deformation.index() != b.deformation.index())
+    return false;
+  if (const auto* translation = std::get_if<Translation>(&a.deformation))
+    return translation->vector == std::get<Translation>(b.deformation).vector;
+  const auto& left = std::get<Rotation>(a.deformation);
+  const auto& right = std::get<Rotation>(b.deformation);
+  return left.point == right.point && left.axis == right.axis && left.angle_rad == right.angle_rad;
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,79 @@
+#pragma once
+// The surface of a session at one point of its history, and the pure steps that lead from one to the next.
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "engine/core/cloud.h"
+#include "engine/editing/edit.h"
+#include "engine/editing/painting.h"
+#include "engine/editing/scale_field.h"
+#include "engine/multires/hierarchy.h"
+
+namespace pointwright::server {
+
+/// How hierarchies are built: build_hierarchy, or a cheaper stand-in in tests.
+using HierarchyBuilder =
+    std::function<Result<Hierarchy>(const Cloud&, const HierarchyParams&, const ExecutionContext&)>;
+
+/// What never changes while a session lives.
+struct RestModel {
+  std::shared_ptr<const Cloud> cloud;
+  HierarchyParams params;
+  float diagonal = 0.0F;  ///< of the rest cloud: what the scales are fractions of
+  std::vector<float> spacing;
+  HierarchyBuilder build;
+};
+
+/// Immutable; copies share everything.
+struct SurfaceState {
+  std::shared_ptr<const MultiresSurface> surface;
+  std::shared_ptr<const std::vector<DecompositionReport>> reports;
+  /// Levels below this one no longer match the finer ones: an edit of a finer level moved those alone.
+  std::uint32_t first_valid_level = 0;
+
+  friend bool operator==(const SurfaceState&, const SurfaceState&) = default;  ///< the same objects
+};
+
+/// Bytes that the state's surface takes.
+std::uint64_t memory_of(const SurfaceState& state);
+
+/// The state with `level` valid: derives the hierarchy of the current surface where it is not. The finest
+/// level keeps its bits. Errors: kCancelled and those of the builder.
+Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState& state, std::uint32_t level,
+                                      const ExecutionContext& context);
+
+/// t on the samples of a level, from the marks. Pre: the level is valid. Errors: kEmptyRegion,
+/// kRegionsIntersect.
+Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const SurfaceState& state,
+                                                   std::uint32_t level, Blend blend, const Marks& marks);
+
+/// The state after an edit. Pre: the level is valid and `field` belongs to it.
+SurfaceState edited(const RestModel& rest, const SurfaceState& state, const EditParams& params,
+                    const ScaleField& field);
+
+/// One recorded edit: all that replaying it needs.
+struct RecordedEdit {
+  std::size_t index = 0;  ///< 1 for the first one
+  EditParams params;
+  std::shared_ptr<const Marks> marks;  ///< the painting at that time
+  std::chrono::system_clock::time_point created;
+  std::size_t moved_samples = 0;
+  std::size_t zero_samples = 0;
+  std::size_t one_samples = 0;
+};
+
+/// All the steps of an edit from its record: the same bits as when it was made.
+Result<SurfaceState> replayed(const RestModel& rest, const SurfaceState& before, const RecordedEdit& record,
+                              const ExecutionContext& context);
+
+/// Samples whose finest position or normal differs. Cost: O(N).
+std::size_t count_moved(const MultiresSurface& before, const MultiresSurface& after);
+
+/// Whether two edits ask for the same, to the bit.
+bool same_params(const EditParams& a, const EditParams& b);
+
+}  // namespace pointwright::server
