@@ -1,12 +1,13 @@
 // Reads the vertices of a binary little-endian PLY file: just what the demonstration needs to check a download.
+// biome-ignore format: a table
 const readers = {
   char: ["getInt8", 1], int8: ["getInt8", 1], uchar: ["getUint8", 1], uint8: ["getUint8", 1],
   short: ["getInt16", 2], int16: ["getInt16", 2], ushort: ["getUint16", 2], uint16: ["getUint16", 2],
   int: ["getInt32", 4], int32: ["getInt32", 4], uint: ["getUint32", 4], uint32: ["getUint32", 4],
   float: ["getFloat32", 4], float32: ["getFloat32", 4], double: ["getFloat64", 8], float64: ["getFloat64", 8],
-}; // biome-ignore format: a table
+};
 
-/** Answers {count, positions: Float64Array(3 * count), records: one Uint8Array per vertex's x, y, z bytes, by index}. */
+/** Answers {count, positions: Float64Array(3 * count)}: float32 coordinates are exact in it. */
 export function readPly(bytes) {
   const end = "end_header\n";
   const headerLength =

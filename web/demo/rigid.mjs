@@ -45,7 +45,8 @@ export function fitRigidMotion(from, to, indices) {
     return sum.map((value) => value / indices.length);
   };
   const [fromMean, toMean] = [mean(from), mean(to)];
-  const s = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]; // biome-ignore format: a matrix
+  // biome-ignore format: a matrix
+  const s = [[0, 0, 0], [0, 0, 0], [0, 0, 0]];
   for (const i of indices) {
     for (let row = 0; row < 3; row++) {
       for (let column = 0; column < 3; column++) {
