@@ -45,16 +45,37 @@ class BinaryBody {
   BinaryBody(std::span<const std::byte> bytes, std::size_t offset, bool swap)
       : bytes_(bytes), offset_(offset), swap_(swap) {}
 
-  // Walks over an element, into `table` unless that is null.
-  Result<void> read(const PlyElement& element, Table* table) {
-    const std::uint64_t row_bytes = element.least_row_bytes();
-    if (row_bytes == 0) return {};
-    if (element.count > (bytes_.size() - offset_) / row_bytes) return cut(element);
-    return element.has_lists() ? read_rows(element, table) : read_columns(element, row_bytes, table);
+  Result<void> read(const PlyElement& element, Table& table) {
+    if (auto fits = check_length(element); !fits) return fits;
+    return element.has_lists() ? read_rows(element, &table) : read_columns(element, table);
   }
-  [[nodiscard]] std::size_t left() const { return bytes_.size() - offset_; }
+  Result<void> skip(const PlyElement& element) {
+    if (auto fits = check_length(element); !fits) return fits;
+    if (element.has_lists()) return read_rows(element, nullptr);
+    offset_ += static_cast<std::size_t>(element.count * element.least_row_bytes());
+    return {};
+  }
+  [[nodiscard]] Result<void> check_length(const PlyElement& element) const {
+    const std::uint64_t row_bytes = element.least_row_bytes();
+    if (row_bytes > 0 && element.count > left() / row_bytes) return cut(element);
+    return {};
+  }
+  // Line ends and zeros after the data are what text-minded tools leave there; more is not this header's
+  // file.
+  [[nodiscard]] Result<void> check_done() const {
+    const auto rest = bytes_.last(left());
+    const auto is_filler = [](std::byte b) {
+      return b == std::byte{'\n'} || b == std::byte{'\r'} || b == std::byte{0};
+    };
+    if (std::all_of(rest.begin(), rest.end(), is_filler)) return {};
+    return Error{.code = ErrorCode::kMalformedData,
+                 .message = std::to_string(left()) + " bytes follow the last element, at byte " +
+                            std::to_string(offset_) + ": the header does not describe this file",
+                 .field = "header"};
+  }
 
  private:
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - offset_; }
   Error cut(const PlyElement& element) const {
     return Error{.code = ErrorCode::kMalformedData,
                  .message = "the file ends at byte " + std::to_string(bytes_.size()) + ", before all " +
@@ -62,10 +83,10 @@ class BinaryBody {
                  .field = clean_name(element.name)};
   }
 
-  Result<void> read_columns(const PlyElement& element, std::uint64_t row_bytes, Table* table) {
+  Result<void> read_columns(const PlyElement& element, Table& table) {
+    const std::uint64_t row_bytes = element.least_row_bytes();
     const std::byte* column_start = bytes_.data() + offset_;
-    offset_ += element.count * row_bytes;
-    if (table == nullptr) return {};
+    offset_ += static_cast<std::size_t>(element.count * row_bytes);
     for (std::size_t p = 0; p < element.properties.size(); ++p) {
       std::visit(
           [&](auto& values) {
@@ -76,7 +97,7 @@ class BinaryBody {
               from += row_bytes;
             }
           },
-          table->of_property[p]->values);
+          table.of_property[p]->values);
       column_start += size_of(element.properties[p].type);
     }
     return {};
@@ -149,32 +170,48 @@ class AsciiBody {
         line_end_(header.line_end),
         line_(header.line_count + 1) {}
 
-  Result<void> read(const PlyElement& element, Table* table) {
-    if (element.properties.empty()) return {};  // rows without a word: blank lines, which count for nothing
-    // A row takes a character for each value and one after each, but for the very last.
-    const auto least = static_cast<std::uint64_t>(element.properties.size()) * 2;
-    if (element.count > (static_cast<std::uint64_t>(end_ - at_) + 1) / least) return too_few(element);
+  // The vertices' rows have exactly the values that the header promises.
+  Result<void> read(const PlyElement& element, Table& table) {
+    if (auto fits = check_length(element); !fits) return fits;
     for (std::uint64_t row = 0; row < element.count; ++row) {
       skip_blank_lines();
       if (at_ == end_) return too_few(element);
       for (std::size_t p = 0; p < element.properties.size(); ++p) {
         const PlyProperty& property = element.properties[p];
-        const bool stored = table != nullptr && !property.is_list;
-        const bool done = property.is_list
-                              ? skip_list()
-                              : read_value(property, stored ? table->of_property[p] : nullptr, row);
+        const bool done = property.is_list ? skip_list() : read_value(property, *table.of_property[p], row);
         if (!done) return bad_value(element, property);
       }
       if (!at_line_end()) return extra_value(element);
     }
     return {};
   }
-  // Nothing but blanks is left.
-  bool is_done() {
-    skip_blank_lines();
-    return at_ == end_;
+  // Rows of other elements are counted, not read: what some programs write there fits no header.
+  Result<void> skip(const PlyElement& element) {
+    if (element.properties.empty())
+      return {};  // rows without a word are blank lines, which count for nothing
+    if (auto fits = check_length(element); !fits) return fits;
+    for (std::uint64_t row = 0; row < element.count; ++row) {
+      skip_blank_lines();
+      if (at_ == end_) return too_few(element);
+      const void* found = std::memchr(at_, line_end_, static_cast<std::size_t>(end_ - at_));
+      at_ = found == nullptr ? end_ : static_cast<const char*>(found);
+    }
+    return {};
   }
-  [[nodiscard]] std::uint64_t line() const { return line_; }
+  // Nothing but blanks is left.
+  Result<void> check_done() {
+    skip_blank_lines();
+    if (at_ == end_) return {};
+    return Error{.code = ErrorCode::kMalformedData,
+                 .message = "line " + std::to_string(line_) + ": more rows than the header describes",
+                 .field = "header"};
+  }
+  // A row takes a character for each value and one after each, but for the very last.
+  [[nodiscard]] Result<void> check_length(const PlyElement& element) const {
+    const auto least = std::max<std::uint64_t>(element.properties.size() * 2, 2);
+    if (element.count > (static_cast<std::uint64_t>(end_ - at_) + 1) / least) return too_few(element);
+    return {};
+  }
 
  private:
   [[nodiscard]] bool is_blank(char c) const {
@@ -200,32 +237,28 @@ class AsciiBody {
     return {begin, static_cast<std::size_t>(at_ - begin)};
   }
 
-  bool read_value(const PlyProperty& property, ScalarAttribute* column, std::uint64_t row) {
+  bool read_value(const PlyProperty& property, ScalarAttribute& column, std::uint64_t row) {
     word_ = next_word();
     if (word_.empty()) return false;
-    if (column == nullptr) {
-      double ignored = 0.0;
-      return parse_number(word_, ignored);
-    }
     switch (property.type) {
       case ScalarType::kInt8:
-        return store_integer<std::int8_t>(*column, row);
+        return store_integer<std::int8_t>(column, row);
       case ScalarType::kUint8:
-        return store_integer<std::uint8_t>(*column, row);
+        return store_integer<std::uint8_t>(column, row);
       case ScalarType::kInt16:
-        return store_integer<std::int16_t>(*column, row);
+        return store_integer<std::int16_t>(column, row);
       case ScalarType::kUint16:
-        return store_integer<std::uint16_t>(*column, row);
+        return store_integer<std::uint16_t>(column, row);
       case ScalarType::kInt32:
-        return store_integer<std::int32_t>(*column, row);
+        return store_integer<std::int32_t>(column, row);
       case ScalarType::kUint32:
-        return store_integer<std::uint32_t>(*column, row);
+        return store_integer<std::uint32_t>(column, row);
       case ScalarType::kFloat:
-        return parse_number(word_, std::get<std::vector<float>>(column->values)[row]);
+        return parse_number(word_, std::get<std::vector<float>>(column.values)[row]);
       case ScalarType::kDouble:
         break;
     }
-    return parse_number(word_, std::get<std::vector<double>>(column->values)[row]);
+    return parse_number(word_, std::get<std::vector<double>>(column.values)[row]);
   }
   template <typename T>
   bool store_integer(ScalarAttribute& column, std::uint64_t row) {
@@ -304,11 +337,22 @@ ImportReport start_report(const PlyHeader& header) {
   return report;
 }
 
-Error trailing(std::uint64_t bytes) {
-  return Error{.code = ErrorCode::kMalformedData,
-               .message = std::to_string(bytes) +
-                          " bytes follow the last element: the header does not describe this file",
-               .field = "header"};
+// The columns of the vertices, whatever the encoding: the body knows how to read and to skip.
+template <typename Body>
+Result<std::vector<ScalarAttribute>> read_elements(const PlyHeader& header, Body& body) {
+  Table vertices;
+  for (const PlyElement& element : header.elements) {
+    if (&element != header.vertex()) {
+      if (auto done = body.skip(element); !done) return done.error();
+      continue;
+    }
+    // What the rows take is held against the bytes there are before anything is allocated for them.
+    if (auto fits = body.check_length(element); !fits) return fits.error();
+    vertices = make_table(element);
+    if (auto done = body.read(element, vertices); !done) return done.error();
+  }
+  if (auto done = body.check_done(); !done) return done.error();
+  return std::move(vertices.columns);
 }
 
 }  // namespace
@@ -318,38 +362,16 @@ Result<ImportedCloud> read_ply(std::span<const std::byte> bytes, const ImportPar
   if (!parsed) return parsed.error();
   const PlyHeader& header = parsed.value();
   if (auto checked = check_counts(header, params); !checked) return checked.error();
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  BinaryBody binary(bytes, header.data_offset, header.encoding == PlyEncoding::kBinaryBigEndian);
-  AsciiBody ascii(text, header);
-  const bool is_ascii = header.encoding == PlyEncoding::kAscii;
-  Table vertices;
-  for (const PlyElement& element : header.elements) {
-    const bool is_vertex = &element == header.vertex();
-    // What the rows take is checked against the bytes there are before anything is allocated for them.
-    const std::uint64_t row_bytes = is_ascii ? element.properties.size() * 2 : element.least_row_bytes();
-    if (is_vertex && row_bytes > 0 && element.count <= (bytes.size() + 1) / row_bytes)
-      vertices = make_table(element);
-    const bool fits = is_vertex && !vertices.columns.empty();
-    auto done = is_ascii ? ascii.read(element, fits ? &vertices : nullptr)
-                         : binary.read(element, fits ? &vertices : nullptr);
-    if (!done) return done.error();
+  Result<std::vector<ScalarAttribute>> columns = std::vector<ScalarAttribute>{};
+  if (header.encoding == PlyEncoding::kAscii) {
+    AsciiBody body({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, header);
+    columns = read_elements(header, body);
+  } else {
+    BinaryBody body(bytes, header.data_offset, header.encoding == PlyEncoding::kBinaryBigEndian);
+    columns = read_elements(header, body);
   }
-  if (is_ascii ? !ascii.is_done() : binary.left() > 0) {
-    const std::uint64_t left = is_ascii ? 0 : binary.left();
-    // Line ends after binary data are what text-minded tools leave there.
-    const auto is_space = [](std::byte b) {
-      return b == std::byte{'\n'} || b == std::byte{'\r'} || b == std::byte{0};
-    };
-    const auto rest = bytes.last(static_cast<std::size_t>(left));
-    if (is_ascii) {
-      return Error{
-          .code = ErrorCode::kMalformedData,
-          .message = "line " + std::to_string(ascii.line()) + ": more rows than the header describes",
-          .field = "header"};
-    }
-    if (!std::all_of(rest.begin(), rest.end(), is_space)) return trailing(left);
-  }
-  return assemble_cloud(std::move(vertices.columns), start_report(header));
+  if (!columns) return columns.error();
+  return assemble_cloud(std::move(columns).value(), start_report(header));
 }
 
 }  // namespace pointwright

@@ -153,19 +153,25 @@ bool is_float_text(double value) {
   return again == value;
 }
 
-std::string clean_name(std::string_view name) {
+std::string clean_text(std::string_view text) {
   std::string result;
-  while (!name.empty() && result.size() < kLongestName) {
-    const std::size_t length = utf8_length(name);
-    const std::string_view sequence = name.substr(0, length == 0 ? 1 : length);
-    if (length == 0 || is_control(sequence) || sequence == " ") {
+  while (!text.empty()) {
+    const std::size_t length = utf8_length(text);
+    const std::string_view sequence = text.substr(0, length == 0 ? 1 : length);
+    if (length == 0 || is_control(sequence)) {
       result += '_';
     } else {
-      if (result.size() + length > kLongestName) break;
       result += sequence;
     }
-    name.remove_prefix(sequence.size());
+    text.remove_prefix(sequence.size());
   }
+  return result;
+}
+
+std::string clean_name(std::string_view name) {
+  std::string result = clean_text(name.substr(0, kLongestName));
+  // The cut may have gone through a character, whose rest is then underscores: as good as any other end.
+  std::replace(result.begin(), result.end(), ' ', '_');
   if (result.empty()) result += '_';
   return result;
 }

@@ -45,6 +45,9 @@ bool is_float_text(double value);
 /// at most 255 bytes, not empty.
 std::string clean_name(std::string_view name);
 
+/// The same for a line of text: blanks stay, and nothing is cut off.
+std::string clean_text(std::string_view text);
+
 /// The start of a piece of a file, quoted for a message.
 std::string quoted(std::string_view piece);
 

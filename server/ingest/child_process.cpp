@@ -1,0 +1,147 @@
+#include "server/ingest/child_process.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace pointwright {
+namespace {
+
+constexpr int kFarDescriptor = 64;  // above every number that the child's own descriptors get
+constexpr std::chrono::milliseconds kLook{50};
+
+// What a child may need to start at all; nothing else of ours (tokens!) goes to it.
+std::vector<char*> child_environment() {
+  constexpr std::array<std::string_view, 6> kPassed{
+      "LD_LIBRARY_PATH=", "ASAN_OPTIONS=",      "UBSAN_OPTIONS=",
+      "TSAN_OPTIONS=",    "LLVM_PROFILE_FILE=", "LSAN_OPTIONS="};
+  std::vector<char*> result;
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    const std::string_view text(*entry);
+    if (std::any_of(kPassed.begin(), kPassed.end(), [&](auto name) { return text.starts_with(name); })) {
+      result.push_back(*entry);
+    }
+  }
+  result.push_back(nullptr);
+  return result;
+}
+
+// posix_spawn's two bundles, destroyed whatever happens.
+struct SpawnPlan {
+  posix_spawn_file_actions_t actions{};
+  posix_spawnattr_t attributes{};
+  bool good = true;
+
+  SpawnPlan() {
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+  }
+  SpawnPlan(const SpawnPlan&) = delete;
+  SpawnPlan& operator=(const SpawnPlan&) = delete;
+  ~SpawnPlan() {
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+  }
+  void require(int error) { good = good && error == 0; }
+};
+
+void reset_signals(SpawnPlan& plan) {
+  sigset_t none;
+  sigset_t all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  plan.require(posix_spawnattr_setsigmask(&plan.attributes, &none));
+  plan.require(posix_spawnattr_setsigdefault(&plan.attributes, &all));
+  plan.require(posix_spawnattr_setflags(&plan.attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF));
+}
+
+void set_descriptors(SpawnPlan& plan, const std::array<Descriptor, 3>& far) {
+  plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0));
+  plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0));
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0));
+#endif
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    plan.require(posix_spawn_file_actions_adddup2(&plan.actions, far[i].get(), static_cast<int>(3 + i)));
+  }
+  plan.require(posix_spawn_file_actions_addclosefrom_np(&plan.actions, 6));
+}
+
+}  // namespace
+
+Descriptor::Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
+  std::swap(number_, other.number_);
+  return *this;
+}
+Descriptor::~Descriptor() {
+  close();
+}
+void Descriptor::close() {
+  if (number_ >= 0) ::close(std::exchange(number_, -1));
+}
+
+std::optional<pid_t> start_child(const std::string& program, const char* argument,
+                                 const std::array<int, 3>& descriptors) {
+  // Copies far up: dup2 onto 3, 4 and 5 must not hit one that is still to be copied.
+  std::array<Descriptor, 3> far;
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    far[i] = Descriptor(fcntl(descriptors[i], F_DUPFD_CLOEXEC, kFarDescriptor));
+    if (!far[i].is_open()) return std::nullopt;
+  }
+  SpawnPlan plan;
+  reset_signals(plan);
+  set_descriptors(plan, far);
+  if (!plan.good) return std::nullopt;
+  std::string name = "pointwright-decoder";
+  std::string first(argument);
+  std::array<char*, 3> arguments{name.data(), first.data(), nullptr};
+  std::vector<char*> environment = child_environment();
+  pid_t child = 0;
+  if (posix_spawn(&child, program.c_str(), &plan.actions, &plan.attributes, arguments.data(),
+                  environment.data()) != 0) {
+    return std::nullopt;
+  }
+  return child;
+}
+
+ChildEnd wait_for_child(pid_t child, const Descriptor& alive, std::chrono::duration<double> deadline,
+                        const ExecutionContext* context) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(deadline);
+  ChildEnd result;
+  int status = 0;
+  bool closed = false;
+  while (true) {
+    const pid_t gone = waitpid(child, &status, WNOHANG);
+    if (gone == child || (gone < 0 && errno != EINTR)) break;
+    result.by_cancel = context != nullptr && context->is_cancelled();
+    result.by_deadline = !result.by_cancel && Clock::now() >= end;
+    if (result.by_cancel || result.by_deadline) {
+      kill(child, SIGKILL);
+      while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+      }
+      break;
+    }
+    // The pipe wakes us the moment the child is gone; a child that closed it and lives on is looked at now
+    // and then.
+    pollfd watched{.fd = alive.get(), .events = POLLIN, .revents = 0};
+    const int ready =
+        poll(closed ? nullptr : &watched, closed ? 0 : 1, closed ? 1 : static_cast<int>(kLook.count()));
+    closed = closed || ready > 0;
+  }
+  if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
+  if (WIFEXITED(status)) result.status = WEXITSTATUS(status);
+  return result;
+}
+
+}  // namespace pointwright

@@ -1,0 +1,153 @@
+#include "server/ingest/confined.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+
+#include "engine/io/decoded_cloud.h"
+#include "server/ingest/child_process.h"
+#include "server/ingest/exchange_record.h"
+
+namespace pointwright {
+namespace {
+
+Error decoder_error(std::string message) {
+  return Error{.code = ErrorCode::kCancelled, .message = std::move(message), .field = "decoder"};
+}
+
+Error too_large(std::string message) {
+  return Error{.code = ErrorCode::kTooLarge, .message = std::move(message), .field = {}};
+}
+
+Descriptor memory_file(const char* name) {
+  return Descriptor(memfd_create(name, MFD_CLOEXEC));
+}
+
+bool write_all(int file, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = write(file, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+// A file's content in our address space while it lives.
+class Mapping {
+ public:
+  explicit Mapping(const Descriptor& file) {
+    struct stat info {};
+    if (fstat(file.get(), &info) != 0 || info.st_size <= 0) return;
+    size_ = static_cast<std::size_t>(info.st_size);
+    void* mapped = mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, file.get(), 0);
+    if (mapped != MAP_FAILED) data_ = static_cast<const std::byte*>(mapped);
+  }
+  Mapping(const Mapping&) = delete;
+  Mapping& operator=(const Mapping&) = delete;
+  ~Mapping() {
+    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast): munmap takes what mmap gave.
+    if (data_ != nullptr) munmap(const_cast<std::byte*>(data_), size_);
+  }
+  [[nodiscard]] std::span<const std::byte> bytes() const {
+    return data_ == nullptr ? std::span<const std::byte>() : std::span(data_, size_);
+  }
+
+ private:
+  const std::byte* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+// Why a decoder that gave no answer gave none.
+Error failure(const ChildEnd& end, const ConfineLimits& limits) {
+  const std::string seconds = std::to_string(static_cast<long>(std::ceil(limits.deadline_seconds)));
+  if (end.by_cancel) return cancelled_error();
+  if (end.by_deadline || end.signal == SIGXCPU) {
+    Error error = too_large("decoding the file takes longer than " + seconds + " s");
+    error.limit = limits.deadline_seconds;
+    return error;
+  }
+  switch (end.signal) {
+    case 0:
+      return end.status == 4 ? too_large("the decoded cloud is larger than a decoder may write")
+                             : decoder_error("the decoder could not be confined, so the file was not read");
+    case SIGXFSZ:
+      return too_large("the decoded cloud is larger than a decoder may write");
+    case SIGKILL:
+      return too_large("decoding the file takes more memory than there is");
+    default:
+      break;
+  }
+  return Error{.code = ErrorCode::kMalformedData,
+               .message = "the file stops the decoder (signal " + std::to_string(end.signal) + ")",
+               .field = {}};
+}
+
+DecodeRequest make_request(std::span<const std::byte> bytes, CloudFormat format, const ImportParams& params,
+                           const ConfineLimits& limits) {
+  DecodeRequest request;
+  request.format = static_cast<std::uint64_t>(format);
+  request.drop_non_finite = params.drop_non_finite ? 1 : 0;
+  request.max_samples = params.max_samples;
+  request.byte_count = bytes.size();
+  request.memory_bytes = limits.memory_bytes;
+  request.cpu_seconds = static_cast<std::uint64_t>(std::ceil(std::max(1.0, limits.deadline_seconds)));
+  return request;
+}
+
+Result<ImportedCloud> decode_in_child(std::span<const std::byte> bytes, CloudFormat format,
+                                      const ImportParams& params, const ConfineLimits& limits,
+                                      const ExecutionContext* context) {
+  const DecodeRequest request = make_request(bytes, format, params, limits);
+  const Descriptor input = memory_file("pointwright-upload");
+  const Descriptor output = memory_file("pointwright-cloud");
+  std::array<int, 2> ends{-1, -1};
+  if (!input.is_open() || !output.is_open() || pipe2(ends.data(), O_CLOEXEC) != 0) {
+    return decoder_error("there are no descriptors left for a decoder");
+  }
+  const Descriptor alive(ends[0]);
+  Descriptor held(ends[1]);
+  if (!write_all(input.get(), std::as_bytes(std::span(&request, 1))) || !write_all(input.get(), bytes)) {
+    return decoder_error("there is no memory left to hand the file to a decoder");
+  }
+  const auto child =
+      start_child(limits.program, kDecodeChildArgument, {input.get(), output.get(), held.get()});
+  held.close();  // the child's copy alone keeps the pipe open
+  if (!child) return decoder_error("no decoder could be started");
+  const ChildEnd end =
+      wait_for_child(*child, alive, std::chrono::duration<double>(limits.deadline_seconds), context);
+  if (end.by_cancel || end.by_deadline || end.signal != 0 || end.status != 0) return failure(end, limits);
+  // The child is gone: nobody but us holds the answer any more.
+  const Mapping answer(output);
+  auto decoded = read_answer(answer.bytes());
+  if (decoded && decoded.value().report.format != format) return failure(ChildEnd{.signal = SIGSYS}, limits);
+  return decoded;
+}
+
+}  // namespace
+
+Result<ImportedCloud> read_confined(std::span<const std::byte> bytes, CloudFormat format,
+                                    const ImportParams& params, const ConfineLimits& limits,
+                                    const ExecutionContext* context) {
+  if (bytes.empty())
+    return Error{.code = ErrorCode::kEmptyCloud, .message = "there are no bytes", .field = {}};
+  Result<ImportedCloud> decoded = cancelled_error();
+  {
+    DecodeSlots::Lease lease;
+    if (limits.slots != nullptr) {
+      lease = limits.slots->acquire(std::chrono::duration<double>(limits.queue_seconds));
+      if (!lease) return decoder_error("every decoder is busy; none came free in time");
+    }
+    decoded = decode_in_child(bytes, format, params, limits, context);
+  }
+  if (!decoded) return decoded;
+  if (context != nullptr && context->is_cancelled()) return cancelled_error();
+  return finish_cloud(std::move(decoded).value(), params);
+}
+
+}  // namespace pointwright

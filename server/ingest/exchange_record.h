@@ -1,0 +1,42 @@
+#pragma once
+// What the daemon and its decoder say to each other. Both are the same program on the same machine: native
+// layout.
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/io/cloud_io.h"
+
+namespace pointwright {
+
+/// Descriptors of the decoder; every other is closed.
+inline constexpr int kRequestDescriptor = 3;  ///< memory file: a DecodeRequest, then the file's bytes
+inline constexpr int kAnswerDescriptor =
+    4;  ///< memory file, empty: an AnswerKind, then a cloud blob or an error
+inline constexpr int kAliveDescriptor = 5;  ///< a pipe's write end that closes when the decoder is gone
+
+struct DecodeRequest {
+  static constexpr std::uint64_t kMagic = 0x3151455254575054ULL;
+  std::uint64_t magic = kMagic;
+  std::uint64_t format = 0;
+  std::uint64_t drop_non_finite = 0;
+  std::uint64_t max_samples = 0;
+  std::uint64_t byte_count = 0;
+  std::uint64_t memory_bytes = 0;
+  std::uint64_t cpu_seconds = 0;
+  std::uint64_t reserved = 0;
+};
+static_assert(sizeof(DecodeRequest) == 64);
+
+enum class AnswerKind : std::uint64_t { kNone = 0, kCloud = 1, kError = 2 };
+
+std::vector<std::byte> error_answer(const Error& error);
+
+/// The decoded cloud or the error that the answer holds. Nothing in it is trusted.
+Result<ImportedCloud> read_answer(std::span<const std::byte> answer);
+
+}  // namespace pointwright

@@ -1,0 +1,93 @@
+#include "server/ingest/files.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <system_error>
+
+#include "server/ingest/child_process.h"
+
+namespace pointwright {
+namespace {
+
+Error file_error(const char* what, const std::string& path, int number) {
+  const bool is_full = number == ENOSPC || number == EDQUOT || number == EFBIG;
+  return Error{.code = is_full ? ErrorCode::kTooLarge : ErrorCode::kInvalidArgument,
+               .message = std::string(what) + " " + path + ": " + std::system_category().message(number),
+               .field = "path"};
+}
+
+Error too_large(const std::string& path, std::uint64_t limit, std::uint64_t actual) {
+  return Error{.code = ErrorCode::kTooLarge,
+               .message = path + " is larger than " + std::to_string(limit) + " bytes",
+               .field = "path",
+               .limit = static_cast<double>(limit),
+               .actual = static_cast<double>(actual)};
+}
+
+bool write_all(int file, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = write(file, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+std::string folder_of(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  if (slash == std::string::npos) return ".";
+  return slash == 0 ? "/" : path.substr(0, slash);
+}
+
+// A name that no other writer, in this process or another, uses at the same time.
+std::string temporary_name(const std::string& path) {
+  static std::atomic<unsigned> counter{0};
+  return path + ".new-" + std::to_string(getpid()) + "-" + std::to_string(counter.fetch_add(1));
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> read_file(const std::string& path, std::uint64_t max_bytes) {
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat info {};
+  if (!file.is_open() || fstat(file.get(), &info) != 0) return file_error("cannot open", path, errno);
+  if (!S_ISREG(info.st_mode)) return file_error("cannot read", path, S_ISDIR(info.st_mode) ? EISDIR : EINVAL);
+  const auto size = static_cast<std::uint64_t>(info.st_size);
+  if (size > max_bytes) return too_large(path, max_bytes, size);
+  std::vector<std::byte> bytes(size);
+  std::size_t at = 0;
+  while (at < bytes.size()) {
+    const ssize_t got = read(file.get(), bytes.data() + at, bytes.size() - at);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return file_error("cannot read", path, errno);
+    if (got == 0) break;  // cut short under our hands
+    at += static_cast<std::size_t>(got);
+  }
+  bytes.resize(at);
+  return bytes;
+}
+
+Result<void> write_file_atomically(const std::string& path, std::span<const std::byte> bytes) {
+  const Descriptor folder(open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!folder.is_open()) return file_error("cannot open the folder of", path, errno);
+  const std::string temporary = temporary_name(path);
+  {
+    Descriptor file(open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
+    if (!file.is_open()) return file_error("cannot create", temporary, errno);
+    const bool is_written = write_all(file.get(), bytes) && fsync(file.get()) == 0;
+    if (!is_written || rename(temporary.c_str(), path.c_str()) != 0) {
+      const int number = errno;
+      unlink(temporary.c_str());
+      return file_error("cannot write", path, number);
+    }
+  }
+  if (fsync(folder.get()) != 0) return file_error("cannot sync the folder of", path, errno);
+  return {};
+}
+
+}  // namespace pointwright
