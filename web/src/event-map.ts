@@ -22,6 +22,8 @@ export interface TransformState {
   pivot: Vec3;
   axis: "x" | "y" | "z" | null;
   pivotEditing: boolean;
+  /** The smooth base moves and carries its detail; else the samples themselves move. */
+  carryDetail: boolean;
   /** Why no transform can be made now; null where it can. */
   obstacle: string | null;
 }

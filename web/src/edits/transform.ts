@@ -9,9 +9,6 @@ import { deformationFault, describeDeformation, isIdentity } from "./deformation
 import { reportError } from "./errors";
 import { PreviewSender } from "./preview";
 
-/** The level that edits act on: this version edits the smooth base. */
-const EDIT_LEVEL = 0;
-
 function obstacleOf(session: SessionDocument): string | null {
   if (session.state !== "ready") return "The session is still being prepared.";
   const { zero, one } = session.regions;
@@ -32,6 +29,7 @@ export class TransformEditor {
   private pivot_: Vec3 = [0, 0, 0];
   private axis_: TransformState["axis"] = null;
   private pivotEditing_ = false;
+  private carryDetail_ = true;
   private committing_: number | null = null;
 
   constructor(bus: Bus, client: ApiClient, queue: CommandQueue, store: SessionStore, onResidual: (d: Deformation | null) => void) {
@@ -71,6 +69,7 @@ export class TransformEditor {
       pivot: this.pivot_,
       axis: this.axis_,
       pivotEditing: this.pivotEditing_,
+      carryDetail: this.carryDetail_,
       obstacle: obstacleOf(this.store_.document),
     };
   }
@@ -105,6 +104,13 @@ export class TransformEditor {
 
   setPivotEditing(editing: boolean): void {
     this.pivotEditing_ = editing;
+    this.tell();
+  }
+
+  /** Whether the smooth base moves and its detail rides along, or the samples themselves move. */
+  setCarryDetail(carry: boolean): void {
+    this.carryDetail_ = carry;
+    if (this.deformation_) this.preview.want(this.deformation_);
     this.tell();
   }
 
@@ -160,7 +166,8 @@ export class TransformEditor {
   }
 
   private body(deformation: Deformation): EditBody {
-    return { level: EDIT_LEVEL, deformation };
+    const levels = this.store_.document.levels.map(({ level }) => level);
+    return { level: this.carryDetail_ ? Math.min(...levels) : Math.max(...levels), deformation };
   }
 
   private tell(): void {

@@ -109,7 +109,7 @@ export function rangeField(
   onChange: (value: number) => void,
 ): { element: HTMLElement; input: HTMLInputElement; set(value: number): void } {
   const id = freshId();
-  const output = h("output", { class: "range-value", htmlFor: undefined as never }, format(value));
+  const output = h("output", { class: "range-value" }, format(value));
   const input = h("input", { id, type: "range", min: String(range.min), max: String(range.max), step: String(range.step), value: String(value) });
   const show = (next: number): void => {
     output.textContent = format(next);

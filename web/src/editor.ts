@@ -1,0 +1,153 @@
+import type { ApiClient } from "./api/client";
+import type { SessionDocument } from "./api/types";
+import { CommandQueue } from "./command-queue";
+import { editorShortcuts } from "./editor-shortcuts";
+import { HistoryEditor } from "./edits/history";
+import { RegionEditor } from "./edits/regions";
+import { reportError } from "./edits/errors";
+import { TransformEditor } from "./edits/transform";
+import { FrameSource } from "./frame-source";
+import { displayFromLink, type LinkState, viewHash } from "./link";
+import { hasAttribute } from "./protocol/frames";
+import { Gizmo } from "./scene/gizmo";
+import { Viewport } from "./scene/viewport";
+import { type Bus, SessionStore } from "./session-store";
+import { type BrushSize, BrushTool } from "./tools/brush-tool";
+import { OrbitTool } from "./tools/orbit-tool";
+import { steppedRadius } from "./tools/stroke";
+import { ToolManager } from "./tools/tool-manager";
+import { TransformTool } from "./tools/transform-tool";
+import { createColourBar } from "./ui/colour-bar";
+import { createDisplayPanel, loadDisplay, saveDisplay } from "./ui/display-panel";
+import { h } from "./ui/dom";
+import { createHistoryPanel } from "./ui/history-panel";
+import { createRegionsPanel } from "./ui/regions-panel";
+import { createShortcutSheet, listen } from "./ui/shortcuts";
+import { createStatusBar } from "./ui/status-bar";
+import { createToolbar } from "./ui/toolbar";
+import { createTopBar } from "./ui/top-bar";
+import { createTransformPanel } from "./ui/transform-panel";
+
+const BRUSH_PART = 0.035;
+const HASH_DELAY_MS = 250;
+
+export interface Editor {
+  viewport: Viewport;
+  source: FrameSource;
+  store: SessionStore;
+  queue: CommandQueue;
+  /** The stream's first key frame is on the screen whole. */
+  loaded(): boolean;
+}
+
+/** Puts the editor of a ready session together. Modules meet on the bus; what is made here lives as long as the page. */
+export function createEditor(root: HTMLElement, bus: Bus, client: ApiClient, document: SessionDocument, link: LinkState): Editor {
+  const store = new SessionStore(bus, document);
+  const queue = new CommandQueue();
+  const stage = h("div", { class: "stage" });
+  root.classList.toggle("bare", !link.ui);
+  root.append(stage);
+  const viewport = new Viewport(stage);
+  viewport.setSpacing(document.spacing, document.sample_count);
+  const display = displayFromLink(link.mode, loadDisplay());
+  viewport.setDisplay(display);
+
+  const regions = new RegionEditor(bus, client, queue, store);
+  const history = new HistoryEditor(bus, client, queue, store);
+  const transform = new TransformEditor(bus, client, queue, store, (deformation) => {
+    viewport.setResidual(
+      deformation?.type === "rotation"
+        ? { ...deformation, axis: { ...deformation.axis, point: store.toScene(deformation.axis.point) } }
+        : deformation,
+    );
+  });
+  let loaded = false;
+  const source = new FrameSource(bus, client, store, viewport, () => {
+    if (link.camera) viewport.rig.setState(link.camera);
+    else viewport.rig.home();
+  });
+  bus.on("load.changed", ({ complete }) => {
+    loaded = complete;
+  });
+  viewport.onContext = (lost) => {
+    if (lost) bus.fire("toast", { kind: "info", title: "The graphics card was taken away", lines: ["The picture comes back by itself."] });
+    else source.restart();
+  };
+
+  const size: BrushSize = { radius: document.diagonal * BRUSH_PART };
+  const brushes = (["zero", "one", "erase"] as const).map((kind) => new BrushTool(kind, viewport, store, regions, size));
+  const setBrush = (radius: number): void => {
+    size.radius = steppedRadius(radius, 0, document.diagonal);
+    bus.fire("brush.radius", size.radius);
+    for (const brush of brushes) brush.refresh();
+  };
+  const stepBrush = (steps: number): void => setBrush(steppedRadius(size.radius, steps, document.diagonal));
+  bus.function("brush.set", setBrush);
+  bus.function("view.frame", () => viewport.rig.frame());
+  const gizmo = new Gizmo(viewport);
+  new ToolManager(bus, new OrbitTool(), [
+    ...brushes,
+    new TransformTool("move", bus, viewport, gizmo, store, transform),
+    new TransformTool("rotate", bus, viewport, gizmo, store, transform),
+  ]);
+  stage.addEventListener(
+    "wheel",
+    (event) => {
+      if (!event.altKey) return;
+      event.preventDefault();
+      event.stopPropagation();
+      stepBrush(event.deltaY < 0 ? 1 : -1);
+    },
+    { capture: true, passive: false },
+  );
+
+  const transformPanel = createTransformPanel(bus, transform);
+  const shortcuts = editorShortcuts({ bus, viewport, editor: transform, transformPanel, stepBrush });
+  const sheet = createShortcutSheet(shortcuts);
+  bus.function("shortcuts.show", () => sheet.show());
+  if (link.ui) listen(shortcuts);
+  root.append(
+    createTopBar(bus, client, store),
+    createToolbar(bus),
+    h(
+      "aside",
+      { class: "side panel", aria: { label: "Properties" } },
+      createRegionsPanel(bus, store, regions, size.radius),
+      transformPanel.element,
+      createDisplayPanel(bus, document, {
+        settings: display,
+        hasColor: () => source.last !== null && hasAttribute(source.last, "color"),
+        up: viewport.rig.up,
+        onUp: (up) => {
+          viewport.rig.setUp(up);
+          viewport.rig.home();
+        },
+      }),
+      createHistoryPanel(bus),
+    ),
+    createColourBar(bus, display),
+    createStatusBar(bus, store),
+    sheet.element,
+  );
+  bus.on("display.changed", (settings) => {
+    viewport.setDisplay(settings);
+    saveDisplay(settings);
+    source.showLevel(settings.level);
+  });
+  keepLink(viewport);
+  source.start();
+  void history.load().catch((error: unknown) => reportError(bus, error, "The history cannot be read"));
+  return { viewport, source, store, queue, loaded: () => loaded };
+}
+
+/** Keeps the address bar at the view, once it rests, so that the link reopens it. */
+function keepLink(viewport: Viewport): void {
+  let timer = 0;
+  viewport.onDrawn = () => {
+    clearTimeout(timer);
+    timer = window.setTimeout(() => {
+      const hash = viewHash(viewport.rig.state, viewport.display);
+      if (hash !== location.hash) window.history.replaceState(null, "", hash);
+    }, HASH_DELAY_MS);
+  };
+}

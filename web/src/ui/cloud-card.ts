@@ -1,0 +1,124 @@
+import type { CloudDocument, SessionSummary } from "../api/types";
+import { sessionUrl } from "../link";
+import { h } from "./dom";
+import { numberField } from "./fields";
+import { formatAge, formatBytes, formatCount } from "./format";
+import { icon } from "./icons";
+
+const DEFAULT_SCALE_PERCENT = 2;
+const MAX_SCALE_PERCENT = 20;
+
+export interface CloudCardOptions {
+  cloud: CloudDocument;
+  /** Newest first. */
+  sessions: readonly SessionSummary[];
+  /** Starts a session whose base is smoothed at a part of the diagonal. */
+  start: (scale: number) => Promise<void>;
+  removeCloud: () => Promise<void>;
+  removeSession: (id: string) => Promise<void>;
+}
+
+/** A cloud with its sessions: reopen one, or begin another. */
+export function createCloudCard(options: CloudCardOptions): HTMLElement {
+  const { cloud, sessions } = options;
+  const facts = [
+    `${formatCount(cloud.sample_count)} samples`,
+    formatBytes(cloud.bytes),
+    [cloud.report.format.toUpperCase(), cloud.report.encoding].filter(Boolean).join(" "),
+    formatAge(cloud.created),
+  ];
+  const notes = importNotes(cloud);
+  return h(
+    "article",
+    { class: "cloud-card", data: { cloud: cloud.id }, aria: { label: cloud.name } },
+    h(
+      "div",
+      { class: "cloud-head" },
+      h("div", { class: "cloud-text" }, h("h3", {}, cloud.name), h("p", { class: "facts" }, facts.filter(Boolean).join(" · ")), notes && h("p", { class: "facts note" }, notes)),
+      startForm(options),
+      confirmButton(`Delete ${cloud.name}`, () => void options.removeCloud()),
+    ),
+    sessions.length > 0 && h("ul", { class: "session-list" }, ...sessions.map((session) => sessionRow(session, options))),
+  );
+}
+
+/** What of the file is not as it was; nothing where all was taken. */
+function importNotes(cloud: CloudDocument): string {
+  const { dropped_non_finite: dropped, duplicate_count: duplicates, skipped, from_mesh: mesh } = cloud.report;
+  const notes: string[] = [];
+  if (mesh) notes.push("vertices of a mesh");
+  if (dropped) notes.push(`${formatCount(dropped)} samples without finite coordinates left out`);
+  if (duplicates) notes.push(`${formatCount(duplicates)} duplicates kept`);
+  if (skipped && skipped.length > 0) notes.push(`not kept: ${skipped.join(", ")}`);
+  return notes.join(" · ");
+}
+
+function startForm(options: CloudCardOptions): HTMLElement {
+  const scale = numberField("Base scale", DEFAULT_SCALE_PERCENT, { unit: "% of the diagonal" });
+  const button = h("button", { type: "submit", class: "button primary", aria: { label: `New session of ${options.cloud.name}` } }, icon("plus"), "New session");
+  const form = h(
+    "form",
+    {
+      class: "start-form",
+      onsubmit: (event) => {
+        event.preventDefault();
+        const percent = scale.value;
+        if (!(percent > 0 && percent <= MAX_SCALE_PERCENT)) {
+          scale.input.setAttribute("aria-invalid", "true");
+          scale.input.focus();
+          return;
+        }
+        button.disabled = true;
+        void options.start(percent / 100).finally(() => {
+          button.disabled = false;
+        });
+      },
+    },
+    scale.element,
+    button,
+  );
+  scale.input.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") form.requestSubmit();
+  });
+  scale.input.title = `What counts as detail: everything finer than this. 0 to ${MAX_SCALE_PERCENT} %.`;
+  return form;
+}
+
+function sessionRow(session: SessionSummary, options: CloudCardOptions): HTMLElement {
+  const state = session.state === "ready" ? `revision ${session.revision ?? 0}` : session.state;
+  return h(
+    "li",
+    { class: "session-row" },
+    h(
+      "a",
+      { href: sessionUrl(session.id), class: "session-link", data: { session: session.id } },
+      h("span", { class: `state-dot ${session.state}`, aria: { hidden: "true" } }),
+      h("span", {}, session.name || options.cloud.name),
+      h("small", {}, `${state} · ${formatAge(session.created)}`),
+    ),
+    confirmButton(`Delete the session of ${formatAge(session.created)}`, () => void options.removeSession(session.id)),
+  );
+}
+
+const CONFIRM_MS = 3000;
+
+/** Deletes at the second press: the first only asks. */
+function confirmButton(label: string, action: () => void): HTMLElement {
+  const button = h("button", { type: "button", class: "icon-button small delete", title: label, aria: { label } }, icon("trash"));
+  let armed = 0;
+  button.addEventListener("click", () => {
+    if (armed !== 0) {
+      clearTimeout(armed);
+      action();
+      return;
+    }
+    button.classList.add("armed");
+    button.setAttribute("aria-label", `${label}: press again to confirm`);
+    armed = window.setTimeout(() => {
+      armed = 0;
+      button.classList.remove("armed");
+      button.setAttribute("aria-label", label);
+    }, CONFIRM_MS);
+  });
+  return button;
+}

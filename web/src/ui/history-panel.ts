@@ -1,0 +1,36 @@
+import type { EditRecord, History } from "../api/types";
+import { describeDeformation } from "../edits/deformation";
+import type { Bus } from "../session-store";
+import { h, replaceChildren, setText } from "./dom";
+import { formatAge, formatCount } from "./format";
+import { icon } from "./icons";
+import { createSection } from "./section";
+
+/** Every edit, with the state that is shown now; a click goes there. */
+export function createHistoryPanel(bus: Bus): HTMLElement {
+  const section = createSection("History");
+  const list = h("ol", { class: "history" });
+  section.body.append(list);
+
+  const entry = (label: string, detail: string, edit: number, head: number): HTMLElement => {
+    const state = edit === head ? "current" : edit > head ? "undone" : "done";
+    const button = h(
+      "button",
+      { type: "button", class: `history-entry ${state}`, data: { edit: String(edit) }, onclick: () => void bus.invoke("edit.jump", edit) },
+      h("span", { class: "history-mark" }, edit === head ? icon("check") : null),
+      h("span", { class: "history-text" }, label, h("small", {}, detail)),
+    );
+    if (edit === head) button.setAttribute("aria-current", "step");
+    return h("li", {}, button);
+  };
+  const describe = (record: EditRecord): string => `${formatCount(record.moved_samples)} samples · ${formatAge(record.created)}`;
+  const show = (history: History): void => {
+    const entries = history.edits.map((record) => entry(describeDeformation(record.edit.deformation), describe(record), record.index, history.head));
+    replaceChildren(list, entry("As loaded", "", 0, history.head), ...entries);
+    setText(section.aside, history.edits.length === 0 ? "" : `${history.head} / ${history.edits.length}`);
+    list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
+  };
+  bus.on("history.changed", show);
+  show({ head: 0, edits: [] });
+  return section.element;
+}

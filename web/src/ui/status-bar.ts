@@ -1,0 +1,38 @@
+import type { Bus, SessionStore } from "../session-store";
+import { h, setText } from "./dom";
+import { formatCount, formatMs, formatRate } from "./format";
+
+/** The line at the lower edge: what is on the screen and how fresh it is. */
+export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
+  const samples = h("span", { class: "status-item", data: { status: "samples" } });
+  const revision = h("span", { class: "status-item", data: { status: "revision" } });
+  const timing = h("span", { class: "status-item", data: { status: "timing" } });
+  const connection = h("span", { class: "status-item connection", data: { status: "connection" } });
+  const badge = h("span", { class: "badge none", role: "status", data: { status: "badge" } });
+  const radius = h("span", { class: "status-item", data: { status: "spacing" } });
+
+  bus.on("load.changed", ({ loaded, total, complete }) => {
+    setText(samples, complete || loaded >= total ? `${formatCount(total)} samples` : `${formatCount(loaded)} of ${formatCount(total)} samples`);
+  });
+  const showSession = (): void => {
+    const { document } = store;
+    setText(revision, `revision ${document.revision}`);
+    setText(radius, `spacing ${Number(document.spacing.toPrecision(3))}`);
+  };
+  bus.on("session.changed", showSession);
+  bus.on("preview.changed", ({ state, latencyMs, samplesPerSecond }) => {
+    badge.className = `badge ${state}`;
+    if (state === "preview") setText(badge, "Preview");
+    else if (state === "exact") {
+      setText(badge, "Exact");
+      setText(timing, `${formatMs(latencyMs)} · ${formatRate(samplesPerSecond)}`);
+      timing.title = "From the hand to the exact frame on the screen, and samples a second at that pace";
+    } else setText(badge, "");
+  });
+  bus.on("connection.changed", (state) => {
+    connection.dataset["state"] = state;
+    setText(connection, state === "live" ? "live" : state === "connecting" ? "connecting…" : "connection lost, trying again…");
+  });
+  showSession();
+  return h("footer", { class: "status-bar", aria: { label: "Status" } }, connection, samples, radius, h("span", { class: "spacer" }), timing, badge, revision);
+}
