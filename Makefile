@@ -72,7 +72,7 @@ serve: ## run the editor on http://$(HOST):$(PORT) until Ctrl-C
 	@.ci/setup build web
 	@$(MAKE) --no-print-directory sample viewer
 	@echo "serve: open http://$(HOST):$(PORT)/ in a browser; Ctrl-C ends it"
-	@exec $(daemon) --host $(HOST) --port $(PORT) --web web/dist --sample "$(dragon)=Stanford dragon"
+	@exec $(daemon) --host $(HOST) --port $(PORT) --web-root web/dist --sample "$(dragon)=Stanford dragon"
 
 test: ## every check and every test; the last line counts them (LANES="format cpp" for some)
 	@.ci/setup build web view lint
@@ -99,7 +99,7 @@ tidy: ## clang-tidy over every C++ source
 
 format: ## put every source file into its canonical form
 	@.ci/setup web lint
-	@git ls-files -z '*.h' '*.cpp' | xargs -0 clang-format-14 -i
+	@git ls-files -z '*.h' '*.cpp' '*.inc' | xargs -0 clang-format-14 -i
 	@cd web && npm run --silent format
 
 check-arm64: ## compile the engine for arm64 (nothing is run)

@@ -3,7 +3,7 @@ import { resolve } from "node:path";
 import { contentOf, root, run, together, trackedFiles, verdict } from "../support/process.mjs";
 
 async function cpp() {
-  const paths = await trackedFiles(/\.(h|cpp)$/);
+  const paths = await trackedFiles(/\.(h|cpp|inc)$/);
   const { status, output } = await run("clang-format-14", ["--dry-run", "--Werror", ...paths]);
   const files = new Set([...output.matchAll(/^(\S+?):\d+:\d+: error/gm)].map(([, path]) => path));
   if (status !== 0 && files.size === 0) return verdict([output]);

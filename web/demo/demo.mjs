@@ -213,7 +213,7 @@ async function main() {
   );
   const start = performance.now();
   const daemon = await step("start the daemon", async () => {
-    const started = await startDaemon(["--web", resolve(root, "web/dist")]);
+    const started = await startDaemon(["--web-root", resolve(root, "web/dist")]);
     return [started.url, started];
   });
   for (const signal of ["SIGINT", "SIGTERM"])
