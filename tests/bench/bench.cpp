@@ -42,7 +42,8 @@ bool BenchReport::write_json(const std::string& path) const {
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const Row& row = rows_[i];
     out << "  {\"name\": \"" << row.name << "\", \"value\": " << row.value << ", \"unit\": \"" << row.unit
-        << "\", \"n\": " << row.n << ", \"threads\": " << row.threads << "}" << (i + 1 < rows_.size() ? "," : "") << "\n";
+        << "\", \"n\": " << row.n << ", \"threads\": " << row.threads << "}"
+        << (i + 1 < rows_.size() ? "," : "") << "\n";
   }
   out << "]\n";
   return static_cast<bool>(out.flush());

@@ -26,7 +26,8 @@ class BenchReport {
 
   /// Median wall time of `work` over at least 7 runs (3 where one takes longer than 2 s) after a warm-up.
   /// unit: "ms" for the whole; "us/point", "ns/point" divide by work_items.
-  void time(const std::string& name, const std::string& unit, double work_items, const std::function<void()>& work);
+  void time(const std::string& name, const std::string& unit, double work_items,
+            const std::function<void()>& work);
 
   /// A figure that was measured elsewhere.
   void add(const std::string& name, const std::string& unit, double work_items, double value);

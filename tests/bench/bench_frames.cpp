@@ -19,8 +19,9 @@ Marks painted_sides(const Points& position) {
   Marks marks(position.size(), 0);
   for (std::size_t i = 0; i < marks.size(); ++i) {
     const float x = position[i].x();
-    marks[i] = x > 1.3F ? static_cast<std::uint8_t>(RegionKind::kOne)
-                        : x < -1.39F ? static_cast<std::uint8_t>(RegionKind::kZero) : std::uint8_t{0};
+    marks[i] = x > 1.3F     ? static_cast<std::uint8_t>(RegionKind::kOne)
+               : x < -1.39F ? static_cast<std::uint8_t>(RegionKind::kZero)
+                            : std::uint8_t{0};
   }
   return marks;
 }
@@ -28,31 +29,21 @@ Marks painted_sides(const Points& position) {
 void bench_drag(BenchReport& report, const std::string& label, std::size_t n) {
   const std::string frame = "frame." + label + ".1band";
   const std::string encode = "frame.encode." + label;
-  const std::string paint_name = "paint." + label;
-  if (!report.wants(frame) && !report.wants(encode) && !report.wants(paint_name)) return;
+  if (!report.wants(frame) && !report.wants(encode)) return;
   const Cloud scan = ordered_scan(n);
   auto built = build_hierarchy(scan, HierarchyParams{}, ExecutionContext{});
   if (!built) std::abort();
   const Hierarchy& hierarchy = built.value();
   const Points& base = hierarchy.surface.levels[0].position;
-  Marks marks = painted_sides(scan.position);
-  const auto field_of = [&] {
-    auto regions = regions_from_marks(base, hierarchy.spacing, marks, scan.origin);
-    if (!regions) std::abort();
-    return compute_scale_field(base, regions.value(), Blend::kQuartic);
-  };
-  const PaintOperation stroke{.shape = Stroke{.vertices = {Vec3d(1.3, -0.3, 0), Vec3d(1.3, 0.3, 0)}, .radius = 0.2}};
-  report.time(paint_name, "ms", static_cast<double>(n), [&] {
-    paint(stroke, RegionKind::kOne, scan.position, hierarchy.surface.finest().normal, scan.origin, marks);
-    field_of();
-  });
-  const ScaleField field = field_of();
+  auto regions = regions_from_marks(base, hierarchy.spacing, painted_sides(scan.position), scan.origin);
+  if (!regions) std::abort();
+  const ScaleField field = compute_scale_field(base, regions.value(), Blend::kQuartic);
   const protocol::FrameLayout layout(static_cast<std::uint32_t>(n));
   const EditParams edit{.deformation = Rotation{.axis = Vec3d::UnitY(), .angle_rad = 0.5 * std::numbers::pi}};
   protocol::FrameBytes bytes;
   const auto encode_surface = [&](const MultiresSurface& surface) {
-    const protocol::FrameColumns columns{.position = &surface.finest().position, .normal = &surface.finest().normal,
-                                         .t = field.t};
+    const protocol::FrameColumns columns{
+        .position = &surface.finest().position, .normal = &surface.finest().normal, .t = field.t};
     encode_key_frame(layout, columns, protocol::FrameState{.origin = scan.origin}, kAttributes, bytes);
   };
   report.time(frame, "ms", static_cast<double>(n),

@@ -45,7 +45,8 @@ void bench_kernels(BenchReport& report) {
     const std::string decomposition = std::string("decompose.") + name;
     const std::string orientation = std::string("orient.k10.") + name;
     const std::string smoothing = std::string("smooth.iteration.") + name;
-    if (!report.wants(normals) && !report.wants(decomposition) && !report.wants(orientation) && !report.wants(smoothing)) {
+    if (!report.wants(normals) && !report.wants(decomposition) && !report.wants(orientation) &&
+        !report.wants(smoothing)) {
       continue;
     }
     const Cloud scan = ordered_scan(static_cast<std::size_t>(n));

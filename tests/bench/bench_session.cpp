@@ -1,9 +1,9 @@
 // Draco bytes to a ready hierarchy, one band: what opening a session costs.
+#include <unistd.h>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <string>
-#include <unistd.h>
 
 #include "engine/io/cloud_io.h"
 #include "engine/multires/hierarchy.h"

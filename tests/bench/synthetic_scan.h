@@ -1,5 +1,6 @@
 #pragma once
-// Synthetic scans of any size: deterministic, with detail at several scales, in random order like a scanner's merge.
+// Synthetic scans of any size: deterministic, with detail at several scales, in random order like a scanner's
+// merge.
 
 #include <cstddef>
 #include <cstdint>
