@@ -1,0 +1,178 @@
+#include <chrono>
+
+#include "protocol/json/documents.h"
+#include "tests/protocol/golden.h"
+
+namespace pointwright::protocol::golden {
+namespace {
+
+constexpr const char* kCloudId = "Jq3cT9rVwXyZ0a1b2c3d4e";
+constexpr const char* kSessionId = "s5f6g7h8i9j0k-l_m1n2o3";
+
+TimePoint created() {
+  using namespace std::chrono;
+  return sys_days(year(2026) / January / 31) + hours(12) + minutes(34) + seconds(56) + milliseconds(789);
+}
+
+ImportReport report() {
+  return {.format = CloudFormat::kPly,
+          .encoding = "binary_little_endian",
+          .declared_count = 437647,
+          .sample_count = 437645,
+          .dropped_non_finite = 2,
+          .duplicate_count = 1,
+          .from_mesh = true,
+          .position_is_double = false,
+          .attributes = {"normal", "color", "quality"},
+          .skipped = {"face"},
+          .bounds_min = Vec3d(-0.125, -0.0625, 0.0),
+          .bounds_max = Vec3d(0.125, 0.125, 0.25)};
+}
+
+CloudDocument cloud() {
+  return {.id = kCloudId,
+          .name = "Dragon, 2nd scan",
+          .sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
+          .bytes = 8'752'000,
+          .created = created(),
+          .origin = Vec3d(0.0, 0.03125, 0.125),
+          .report = report()};
+}
+
+SessionDocument building() {
+  SessionDocument session;
+  session.summary = {.id = kSessionId,
+                     .name = "Wings up",
+                     .cloud = kCloudId,
+                     .state = SessionState::kBuilding,
+                     .revision = 0,
+                     .created = created(),
+                     .sample_count = 437645};
+  session.progress = {.phase = "normals", .fraction = 0.25};
+  session.origin = cloud().origin;
+  session.bounds = {.min = report().bounds_min, .max = report().bounds_max};
+  return session;
+}
+
+SessionDocument ready() {
+  SessionDocument session = building();
+  session.summary.state = SessionState::kReady;
+  session.summary.revision = 5;
+  session.progress = {.phase = "ready", .fraction = 1.0};
+  session.spacing = 0.000375;
+  session.level_scales = {0.00796875, 0.0};
+  session.decomposition = {{.scale = 0.00796875F,
+                            .base_samples = 21300,
+                            .at_limit = 12,
+                            .fallback = 3,
+                            .flipped = 2,
+                            .mean_iterations = 2.5,
+                            .max_detail = 0.00625F,
+                            .rms_detail = 0.00075F}};
+  session.zero = {.samples = 120000, .operations = 2};
+  session.one = {.samples = 9500, .operations = 1};
+  session.head = 1;
+  session.edits = 2;
+  session.timings_ms = {{"normals", 61.5}, {"smoothing", 340.0}, {"decomposition", 205.25}};
+  return session;
+}
+
+SessionDocument failed() {
+  SessionDocument session = building();
+  session.summary.state = SessionState::kFailed;
+  session.error = Problem{.kind = ProblemKind::kCancelled,
+                          .detail = "the work was cancelled",
+                          .instance = std::string("/v1/sessions/") + kSessionId,
+                          .request_id = "3b1d9a52c7e84f60"};
+  return session;
+}
+
+std::vector<PaintOperation> operations() {
+  return {{.mode = PaintMode::kSet,
+           .shape = HalfSpace{.point = Vec3d(0.0, 0.05, 0.0), .normal = Vec3d(0.0, -1.0, 0.0)}},
+          {.mode = PaintMode::kAdd,
+           .shape = Stroke{.vertices = {Vec3d(0.1, 0.1, 0.05), Vec3d(0.11, 0.1, 0.05)}, .radius = 0.004},
+           .facing = Vec3d(0.0, 0.0, 1.0),
+           .steal = true}};
+}
+
+std::vector<EditRecord> edits() {
+  return {{.index = 1,
+           .edit = {.level = 0, .deformation = Translation{.vector = Vec3d(0.0, 0.02, 0.0)}},
+           .created = created(),
+           .moved_samples = 317000,
+           .zero_samples = 120000,
+           .one_samples = 9500},
+          {.index = 2,
+           .edit = {.level = 0,
+                    .deformation = Rotation{.point = Vec3d(0.0, 0.05, 0.0),
+                                            .axis = Vec3d(0.0, 1.0, 0.0),
+                                            .angle_rad = to_radians(37.5)}},
+           .created = created(),
+           .moved_samples = 317000,
+           .zero_samples = 120000,
+           .one_samples = 9500}};
+}
+
+Problem invalid() {
+  return {.kind = ProblemKind::kInvalidValue,
+          .detail = "/shape/radius: must be a number, but is null (and 1 more fault)",
+          .instance = std::string("/v1/sessions/") + kSessionId + "/regions/one/operations",
+          .request_id = "3b1d9a52c7e84f60",
+          .errors = {{"/shape/radius", "must be a number, but is null"},
+                     {"/colour", "this member is unknown here"}}};
+}
+
+Problem stale() {
+  return {.kind = ProblemKind::kStaleRevision,
+          .detail = "the edit was made for revision 4, the session is at revision 5",
+          .instance = std::string("/v1/sessions/") + kSessionId + "/edits",
+          .request_id = "3b1d9a52c7e84f61",
+          .revision = 5};
+}
+
+Problem too_large() {
+  return {.kind = ProblemKind::kTooManySamples,
+          .detail = "the file claims 60000000 samples, beyond the limit of 50000000",
+          .instance = "/v1/clouds",
+          .request_id = "3b1d9a52c7e84f62",
+          .limit = 50'000'000,
+          .actual = 60'000'000};
+}
+
+InfoDocument info() {
+  return {.version = "0.1.0",
+          .limits = {{"max_samples", 50'000'000}, {"max_upload_bytes", 2'147'483'648}, {"max_sessions", 16}},
+          .formats = {"draco", "ply", "xyz"},
+          .features = {"preview", "stream"}};
+}
+
+}  // namespace
+
+std::vector<File> document_files() {
+  const std::vector<std::pair<std::string, JsonDocument>> documents{
+      {"cloud", to_json(cloud())},
+      {"cloud-list", cloud_list({cloud()})},
+      {"session-building", to_json(building())},
+      {"session", to_json(ready())},
+      {"session-failed", to_json(failed())},
+      {"session-list", session_list({building().summary, ready().summary})},
+      {"painting", painting_document(RegionKind::kZero, 120000, operations())},
+      {"edit-list", edit_list(1, edits())},
+      {"problem-invalid", to_json(invalid())},
+      {"problem-stale", to_json(stale())},
+      {"problem-limit", to_json(too_large())},
+      {"info", to_json(info())},
+      {"event-session", session_event(ready())},
+      {"event-progress", progress_event({.phase = "normals", .fraction = 0.25})},
+      {"event-heartbeat", heartbeat_event()},
+      {"event-end", end_event("the session was deleted")}};
+  std::vector<File> files;
+  files.reserve(documents.size());
+  for (const auto& [name, document] : documents) {
+    files.push_back({.path = "examples/" + name + ".json", .content = document.dump(2) + "\n"});
+  }
+  return files;
+}
+
+}  // namespace pointwright::protocol::golden

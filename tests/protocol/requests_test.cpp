@@ -1,0 +1,221 @@
+#include "protocol/json/requests.h"
+
+#include <doctest/doctest.h>
+
+#include <numbers>
+#include <random>
+
+using namespace pointwright;
+using namespace pointwright::protocol;
+
+namespace {
+
+template <typename T>
+T accepted(std::string_view text, Parsed<T> (*parse)(const Json&)) {
+  auto value = parse_body(text, {}, parse);
+  REQUIRE_MESSAGE(value.ok(), (value.ok() ? "" : value.errors().summary()));
+  return std::move(value).value();
+}
+
+/// The pointers that the refusal names.
+template <typename T>
+std::vector<std::string> refused(std::string_view text, Parsed<T> (*parse)(const Json&)) {
+  auto value = parse_body(text, {}, parse);
+  REQUIRE_MESSAGE(!value.ok(), text);
+  CHECK(value.errors().kind == JsonErrorKind::kInvalid);
+  std::vector<std::string> pointers;
+  for (const JsonFault& fault : value.errors().faults) pointers.push_back(fault.pointer);
+  return pointers;
+}
+
+using Pointers = std::vector<std::string>;
+constexpr const char* kId = "Jq3cT9rVwXyZ0a1b2c3d4e";
+
+}  // namespace
+
+TEST_CASE("paint operations are read with every shape and mode") {
+  const auto sphere = accepted(R"({"mode":"add","shape":{"type":"sphere","center":[1,2,3],"radius":0.5}})",
+                               parse_paint_operation);
+  CHECK(sphere.mode == PaintMode::kAdd);
+  CHECK(std::get<Sphere>(sphere.shape).center == Vec3d(1, 2, 3));
+  CHECK(std::get<Sphere>(sphere.shape).radius == 0.5);
+  CHECK_FALSE(sphere.facing.has_value());
+  CHECK_FALSE(sphere.steal);
+  const auto stroke = accepted(
+      R"({"mode":"remove","shape":{"type":"stroke","vertices":[[0,0,0],[1,0,0]],"radius":1},"facing":[0,0,2],"steal":true})",
+      parse_paint_operation);
+  CHECK(stroke.mode == PaintMode::kRemove);
+  CHECK(std::get<Stroke>(stroke.shape).vertices.size() == 2);
+  CHECK(stroke.facing == Vec3d(0, 0, 2));
+  CHECK(stroke.steal);
+  const auto box = accepted(R"({"mode":"intersect","shape":{"type":"box","min":[0,0,0],"max":[1,1,1]}})",
+                            parse_paint_operation);
+  CHECK(box.mode == PaintMode::kIntersect);
+  CHECK(std::get<AxisBox>(box.shape).max == Vec3d(1, 1, 1));
+  const auto half =
+      accepted(R"({"mode":"set","shape":{"type":"half_space","point":[0,0,1],"normal":[0,1,0]}})",
+               parse_paint_operation);
+  CHECK(half.mode == PaintMode::kSet);
+  CHECK(std::get<HalfSpace>(half.shape).normal == Vec3d(0, 1, 0));
+  CHECK(std::holds_alternative<Everything>(
+      accepted(R"({"mode":"set","shape":{"type":"all"}})", parse_paint_operation).shape));
+}
+
+TEST_CASE("whatever is wrong with a paint operation is pointed at") {
+  CHECK(refused("[]", parse_paint_operation) == Pointers{""});
+  CHECK(refused("{}", parse_paint_operation) == Pointers{"/mode", "/shape"});
+  CHECK(refused(R"({"mode":"blur","shape":{"type":"all"}})", parse_paint_operation) == Pointers{"/mode"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"cone"}})", parse_paint_operation) ==
+        Pointers{"/shape/type"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"sphere","center":[1,2],"radius":true}})",
+                parse_paint_operation) == Pointers{"/shape/center", "/shape/radius"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"sphere","center":[1,2,"3"],"radius":1}})",
+                parse_paint_operation) == Pointers{"/shape/center/2"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"all","radius":1}})", parse_paint_operation) ==
+        Pointers{"/shape/radius"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"all"},"steal":1,"colour":2})", parse_paint_operation) ==
+        Pointers{"/steal", "/colour"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"all"},"facing":null})", parse_paint_operation) ==
+        Pointers{"/facing"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"stroke","vertices":[],"radius":1}})",
+                parse_paint_operation) == Pointers{"/shape/vertices"});
+}
+
+TEST_CASE("the engine's verdict on values comes back with the document's pointer") {
+  CHECK(refused(R"({"mode":"add","shape":{"type":"sphere","center":[0,0,0],"radius":0}})",
+                parse_paint_operation) == Pointers{"/shape/radius"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"all"},"facing":[0,0,0]})", parse_paint_operation) ==
+        Pointers{"/facing"});
+  CHECK(refused(R"({"operations":[{"mode":"add","shape":{"type":"all"}},
+                  {"mode":"add","shape":{"type":"sphere","center":[0,0,0],"radius":-1}}]})",
+                parse_painting) == Pointers{"/operations/1/shape/radius"});
+  CHECK(
+      refused(
+          R"({"level":0,"deformation":{"type":"rotation","axis":{"point":[0,0,0],"direction":[0,0,0]},"angle_deg":1}})",
+          parse_edit) == Pointers{"/deformation/axis/direction"});
+  CHECK(
+      refused(
+          R"({"level":0,"deformation":{"type":"rotation","axis":{"point":[0,0,0],"direction":[0,0,1]},"angle_deg":1e9}})",
+          parse_edit) == Pointers{"/deformation/angle_deg"});
+}
+
+TEST_CASE("a painting is a list of operations, also an empty one, with a limit") {
+  CHECK(accepted(R"({"operations":[]})", parse_painting).empty());
+  CHECK(accepted(R"({"operations":[{"mode":"set","shape":{"type":"all"}}]})", parse_painting).size() == 1);
+  CHECK(refused(R"({"operations":{}})", parse_painting) == Pointers{"/operations"});
+  CHECK(refused(R"({"operations":[],"region":"zero"})", parse_painting) == Pointers{"/region"});
+  std::string many = R"({"operations":[)";
+  for (std::size_t i = 0; i <= kMaxPaintOperations; ++i) {
+    many += std::string(i == 0 ? "" : ",") + R"({"mode":"set","shape":{"type":"all"}})";
+  }
+  CHECK(refused(many + "]}", parse_painting) == Pointers{"/operations"});
+}
+
+TEST_CASE("edits are read, degrees become radians") {
+  const auto edit = accepted(
+      R"({"level":1,"blend":"quartic","deformation":{"type":"rotation","axis":{"point":[1,2,3],"direction":[0,0,2]},"angle_deg":-90}})",
+      parse_edit);
+  CHECK(edit.level == 1);
+  CHECK(edit.blend == Blend::kQuartic);
+  const auto& rotation = std::get<Rotation>(edit.deformation);
+  CHECK(rotation.point == Vec3d(1, 2, 3));
+  CHECK(rotation.axis == Vec3d(0, 0, 2));
+  CHECK(rotation.angle_rad == -std::numbers::pi / 2);
+  CHECK(accepted(R"({"level":0,"deformation":{"type":"translation","vector":[0,0,0]}})", parse_edit).level ==
+        0);
+}
+
+TEST_CASE("levels, sequences and heads are whole numbers in range") {
+  const std::string rest = R"(,"deformation":{"type":"translation","vector":[0,0,1]}})";
+  for (const char* level :
+       {"-1", "1.9", "true", "\"0\"", "null", "256", "4294967296", "1e300", "18446744073709551615"}) {
+    CHECK(refused(R"({"level":)" + std::string(level) + rest, parse_edit) == Pointers{"/level"});
+    CHECK(refused(R"({"sequence":1,"level":)" + std::string(level) + rest, parse_preview) ==
+          Pointers{"/level"});
+  }
+  for (const char* sequence : {"0", "-1", "0.5", "9007199254740992", "true"}) {
+    CHECK(refused(R"({"level":0,"sequence":)" + std::string(sequence) + rest, parse_preview) ==
+          Pointers{"/sequence"});
+  }
+  CHECK(accepted(R"({"level":0,"sequence":9007199254740991)" + rest, parse_preview).sequence ==
+        9007199254740991U);
+  CHECK(refused(R"({"level":0)" + rest, parse_preview) == Pointers{"/sequence"});
+  CHECK(refused(R"({"level":0,"sequence":1)" + rest, parse_edit) == Pointers{"/sequence"});
+  CHECK(accepted(R"({"edit":4294967295})", parse_head).edit == 4294967295U);
+  for (const char* edit : {"-1", "4294967296", "0.1", "null"}) {
+    CHECK(refused(R"({"edit":)" + std::string(edit) + "}", parse_head) == Pointers{"/edit"});
+  }
+}
+
+TEST_CASE("a session names its cloud; the rest has defaults") {
+  const std::string cloud = R"({"cloud":")" + std::string(kId) + '"';
+  const auto plain = accepted(cloud + "}", parse_create_session);
+  CHECK(plain.cloud == kId);
+  CHECK(plain.name.empty());
+  CHECK(plain.params == HierarchyParams{});
+  const auto full =
+      accepted(cloud + R"(,"name":"Wings","scales":[0.05],"neighbors":12})", parse_create_session);
+  CHECK(full.name == "Wings");
+  CHECK(full.params.scales == std::vector<float>{0.05F});
+  CHECK(full.params.neighbors == 12);
+
+  CHECK(refused(R"({"cloud":"short"})", parse_create_session) == Pointers{"/cloud"});
+  CHECK(refused(R"({"cloud":7})", parse_create_session) == Pointers{"/cloud"});
+  CHECK(refused(cloud + R"(,"name":""})", parse_create_session) == Pointers{"/name"});
+  CHECK(refused(cloud + R"(,"scales":[]})", parse_create_session) == Pointers{"/scales"});
+  CHECK(refused(cloud + R"(,"scales":0.02})", parse_create_session) == Pointers{"/scales"});
+  CHECK(refused(cloud + R"(,"scales":["a"]})", parse_create_session) == Pointers{"/scales/0"});
+  CHECK(refused(cloud + R"(,"scales":[1e300]})", parse_create_session) == Pointers{"/scales/0"});
+  CHECK(refused(cloud + R"(,"neighbors":3})", parse_create_session) == Pointers{"/neighbors"});
+  CHECK(refused(cloud + R"(,"neighbors":9.5})", parse_create_session) == Pointers{"/neighbors"});
+  CHECK(refused(cloud + R"(,"preview":true})", parse_create_session) == Pointers{"/preview"});
+  CHECK(refused(cloud + R"(,"scales":[0.3]})", parse_create_session).size() == 1);
+  CHECK(refused(cloud + R"(,"scales":[0.05,0.02]})", parse_create_session).size() == 1);
+}
+
+TEST_CASE("what was read is written back and read again to the bit") {
+  for (
+      const char* text :
+      {R"({"mode":"add","shape":{"type":"sphere","center":[0.1,0.2,0.30000000000000004],"radius":1e-9}})",
+       R"({"mode":"set","shape":{"type":"stroke","vertices":[[0.0,1.0,2.0]],"radius":0.5},"facing":[0.0,0.0,1.0],"steal":true})",
+       R"({"mode":"remove","shape":{"type":"box","min":[-1.0,-1.0,-1.0],"max":[1.0,1.0,1.0]}})",
+       R"({"mode":"intersect","shape":{"type":"half_space","point":[0.0,0.0,0.0],"normal":[0.0,1.0,0.0]}})",
+       R"({"mode":"add","shape":{"type":"all"}})"}) {
+    CHECK(to_json(accepted(text, parse_paint_operation)).dump() == text);
+  }
+  const char* edit =
+      R"({"level":1,"blend":"quartic","deformation":{"type":"translation","vector":[0.1,-0.2,1e-17]}})";
+  CHECK(to_json(accepted(edit, parse_edit)).dump() == edit);
+}
+
+TEST_CASE("degrees survive radians: a person's angle comes back as typed, any angle to the same bits") {
+  for (const double degrees : {0.0, 30.0, 37.5, 90.0, -45.0, 179.999, 0.1, 720.0, 1e-6, 35999.0}) {
+    CHECK(to_degrees(to_radians(degrees)) == degrees);
+  }
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> angle(-36000.0, 36000.0);
+  for (int i = 0; i < 100'000; ++i) {
+    const double radians = to_radians(angle(random));
+    REQUIRE(to_radians(to_degrees(radians)) == radians);
+  }
+}
+
+TEST_CASE("names and ids are checked") {
+  CHECK(is_valid_name("Dragon, 2nd scan"));
+  CHECK(is_valid_name("Zürich 龍"));
+  CHECK(is_valid_name(std::string(120, 'a')));
+  CHECK_FALSE(is_valid_name(""));
+  CHECK_FALSE(is_valid_name(std::string(121, 'a')));
+  for (const char* name : {"a\nb", "a\x7f", "\x1b[31m", "\xff", "\xc3", "\xc2\x85", "a\xe2\x28\xa1"}) {
+    CHECK_FALSE(is_valid_name(name));
+  }
+  CHECK_FALSE(is_valid_name(std::string_view("a\0b", 3)));
+  CHECK(is_valid_id(kId));
+  CHECK_FALSE(is_valid_id(""));
+  CHECK_FALSE(is_valid_id("Jq3cT9rVwXyZ0a1b2c3d4"));
+  CHECK_FALSE(is_valid_id("Jq3cT9rVwXyZ0a1b2c3d4e5"));
+  CHECK_FALSE(is_valid_id("Jq3cT9rVwXyZ0a1b2c3d4/"));
+  CHECK(region_of_name("zero") == RegionKind::kZero);
+  CHECK(region_of_name("one") == RegionKind::kOne);
+  CHECK_FALSE(region_of_name("two").has_value());
+}
