@@ -1,11 +1,12 @@
 #include "engine/core/parallel.h"
 
-#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 namespace pointwright {
 
@@ -75,6 +76,14 @@ void sort_by_key(std::vector<std::uint64_t>& keys, std::vector<std::uint32_t>& v
 }
 
 void with_threads(int threads, const std::function<void()>& work) {
+  // TBB starts no more workers than the machine has processors, whatever an arena asks for. Raised only: a
+  // control below that number would bind every other thread of the process, too.
+  using Control = tbb::global_control;
+  std::optional<Control> more;
+  if (threads > 0 &&
+      static_cast<std::size_t>(threads) > Control::active_value(Control::max_allowed_parallelism)) {
+    more.emplace(Control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+  }
   tbb::task_arena arena(threads <= 0 ? tbb::task_arena::automatic : threads);
   arena.execute(work);
 }
