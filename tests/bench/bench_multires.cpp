@@ -39,45 +39,51 @@ void bench_search(BenchReport& report) {
   }
 }
 
-void bench_kernels(BenchReport& report) {
-  for (const auto& [name, n] : {std::pair{"150k", 150'000}, std::pair{"2m", 2'000'000}}) {
-    const std::string normals = std::string("normals.k10.") + name;
-    const std::string decomposition = std::string("decompose.") + name;
-    const std::string orientation = std::string("orient.k10.") + name;
-    const std::string smoothing = std::string("smooth.iteration.") + name;
-    if (!report.wants(normals) && !report.wants(decomposition) && !report.wants(orientation) &&
-        !report.wants(smoothing)) {
-      continue;
-    }
-    const Cloud scan = ordered_scan(static_cast<std::size_t>(n));
-    const NeighborGraph graph = build_neighbor_graph(scan.position, 10);
-    Points normal;
-    report.time(normals, "ns/point", n, [&] { estimate_normals(scan.position, graph, {}, normal); });
-    estimate_normals(scan.position, graph, {}, normal);
-    report.time(orientation, "ms", n, [&] {
-      Points sided = normal;
-      orient_normals(scan.position, graph, sided);
-    });
-    orient_normals(scan.position, graph, normal);
-    report.time(smoothing, "ms", n, [&] {
-      const UmbrellaParams params{.preserve = VolumePreservation::kLocal, .iterations = 10};
-      if (!smooth(scan.position, normal, graph, params)) std::abort();
-    });
-    const float diagonal = bounds_of(scan.position).diagonal();
-    const ExecutionContext context;
-    const std::vector<float> spacing = local_spacing(scan.position, graph);
-    report.time(decomposition, "ms", n, [&] {
-      const auto base = build_base_surface(scan.position, normal, scan.origin, 0.02F * diagonal, context);
-      if (!base || !decompose(scan.position, normal, base.value(), spacing[0], {}, context)) std::abort();
-    });
+struct Size {
+  std::size_t samples;
+  const char* normals;
+  const char* orientation;
+  const char* smoothing;
+  const char* decomposition;
+};
+
+void bench_kernels(BenchReport& report, const Size& size) {
+  if (!report.wants(size.normals) && !report.wants(size.decomposition) && !report.wants(size.orientation) &&
+      !report.wants(size.smoothing)) {
+    return;
   }
+  const auto n = static_cast<double>(size.samples);
+  const Cloud scan = ordered_scan(size.samples);
+  const NeighborGraph graph = build_neighbor_graph(scan.position, 10);
+  Points normal;
+  estimate_normals(scan.position, graph, {}, normal);
+  report.time(size.normals, "ns/point", n, [&] { estimate_normals(scan.position, graph, {}, normal); });
+  report.time(size.orientation, "ms", n, [&] {
+    Points sided = normal;
+    orient_normals(scan.position, graph, sided);
+  });
+  orient_normals(scan.position, graph, normal);
+  report.time(size.smoothing, "ms", n, [&] {
+    const UmbrellaParams params{.preserve = VolumePreservation::kLocal, .iterations = 10};
+    if (!smooth(scan.position, normal, graph, params)) std::abort();
+  });
+  const float diagonal = bounds_of(scan.position).diagonal();
+  const ExecutionContext context;
+  const std::vector<float> spacing = local_spacing(scan.position, graph);
+  report.time(size.decomposition, "ms", n, [&] {
+    const auto base = build_base_surface(scan.position, normal, scan.origin, 0.02F * diagonal, context);
+    if (!base || !decompose(scan.position, normal, base.value(), spacing[0], {}, context)) std::abort();
+  });
 }
 
 }  // namespace
 
 void bench_multires(BenchReport& report) {
   bench_search(report);
-  bench_kernels(report);
+  bench_kernels(
+      report, {150'000, "normals.k10.150k", "orient.k10.150k", "smooth.10iterations.150k", "decompose.150k"});
+  bench_kernels(report,
+                {2'000'000, "normals.k10.2m", "orient.k10.2m", "smooth.10iterations.2m", "decompose.2m"});
 }
 
 }  // namespace pointwright::bench
