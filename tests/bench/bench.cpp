@@ -9,6 +9,10 @@
 
 namespace pointwright::bench {
 
+bool BenchReport::wants(std::string_view name) const {
+  return name.find(filter_) != std::string_view::npos;
+}
+
 void BenchReport::time(const std::string& name, const std::string& unit, double work_items,
                        const std::function<void()>& work) {
   if (!wants(name)) return;
