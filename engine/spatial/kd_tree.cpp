@@ -2,6 +2,7 @@
 #include "engine/spatial/kd_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
@@ -25,14 +26,46 @@ using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<f
                                                   PackedPoints, 3, std::uint32_t>;
 constexpr std::size_t kLeafSize = 12;
 
+// The nearest points so far, by distance, then index. nanoflann's own set keeps whichever of the points at
+// the last distance it meets first.
+class NearestSet {
+ public:
+  using DistanceType = float;
+
+  NearestSet(std::vector<Neighbor>& slots, const std::vector<std::uint32_t>& subset)
+      : slots_(slots), subset_(subset) {}
+
+  [[nodiscard]] std::size_t size() const { return count_; }
+  [[nodiscard]] bool full() const { return count_ == slots_.size(); }
+  bool addPoint(float distance_sq, std::uint32_t i) {
+    const Neighbor candidate{subset_.empty() ? i : subset_[i], distance_sq};
+    if (full() && !(candidate < slots_[count_ - 1])) return true;
+    std::size_t at = full() ? count_ - 1 : count_++;
+    for (; at > 0 && candidate < slots_[at - 1]; --at) slots_[at] = slots_[at - 1];
+    slots_[at] = candidate;
+    if (full()) {  // the next float: squared distances are not negative
+      bound_ = std::bit_cast<float>(std::bit_cast<std::uint32_t>(slots_[count_ - 1].distance_sq) + 1U);
+    }
+    return true;
+  }
+  // nanoflann looks at what is nearer than this: ties with the last one must come in, too.
+  [[nodiscard]] float worstDist() const { return bound_; }
+
+ private:
+  std::vector<Neighbor>& slots_;
+  const std::vector<std::uint32_t>& subset_;
+  std::size_t count_ = 0;
+  float bound_ = std::numeric_limits<float>::infinity();
+};
+
 }  // namespace
 
 struct KdTree::Tree {
-  Tree(const Points& points, std::vector<std::uint32_t> chosen) : subset(std::move(chosen)) {
-    const std::size_t n = subset.empty() ? points.size() : subset.size();
+  Tree(const Points& points, bool whole, std::vector<std::uint32_t> chosen) : subset(std::move(chosen)) {
+    const std::size_t n = whole ? points.size() : subset.size();
     packed.xyz.resize(3 * n);
     for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t from = subset.empty() ? i : subset[i];
+      const std::size_t from = whole ? i : subset[i];
       packed.xyz[3 * i] = points.x()[from];
       packed.xyz[3 * i + 1] = points.y()[from];
       packed.xyz[3 * i + 2] = points.z()[from];
@@ -43,13 +76,14 @@ struct KdTree::Tree {
   [[nodiscard]] std::uint32_t original(std::uint32_t i) const { return subset.empty() ? i : subset[i]; }
 
   PackedPoints packed;
-  std::vector<std::uint32_t> subset;  // empty: all points
+  std::vector<std::uint32_t> subset;  // empty: all points, or none at all
   std::unique_ptr<Index> index;
 };
 
-KdTree::KdTree(const Points& points) : tree_(std::make_unique<Tree>(points, std::vector<std::uint32_t>{})) {}
+KdTree::KdTree(const Points& points)
+    : tree_(std::make_unique<Tree>(points, true, std::vector<std::uint32_t>{})) {}
 KdTree::KdTree(const Points& points, std::vector<std::uint32_t> subset)
-    : tree_(std::make_unique<Tree>(points, std::move(subset))) {}
+    : tree_(std::make_unique<Tree>(points, false, std::move(subset))) {}
 KdTree::~KdTree() = default;
 KdTree::KdTree(KdTree&&) noexcept = default;
 KdTree& KdTree::operator=(KdTree&&) noexcept = default;
@@ -59,22 +93,10 @@ std::size_t KdTree::size() const {
 }
 
 void KdTree::nearest(const Vec3f& query, std::size_t k, std::vector<Neighbor>& found) const {
-  k = std::min(k, size());
-  found.clear();
-  if (k == 0) return;
-  constexpr std::size_t kStack = 64;
-  std::uint32_t stack_index[kStack];
-  float stack_distance[kStack];
-  std::vector<std::uint32_t> heap_index(k > kStack ? k : 0);
-  std::vector<float> heap_distance(k > kStack ? k : 0);
-  std::uint32_t* index = k > kStack ? heap_index.data() : stack_index;
-  float* distance = k > kStack ? heap_distance.data() : stack_distance;
-  nanoflann::KNNResultSet<float, std::uint32_t> result(k);
-  result.init(index, distance);
-  tree_->index->findNeighbors(result, query.data(), nanoflann::SearchParams());
-  found.reserve(result.size());
-  for (std::size_t i = 0; i < result.size(); ++i) found.push_back({tree_->original(index[i]), distance[i]});
-  std::sort(found.begin(), found.end());
+  found.resize(std::min(k, size()));
+  if (found.empty()) return;
+  NearestSet nearest(found, tree_->subset);
+  tree_->index->findNeighbors(nearest, query.data(), nanoflann::SearchParams());
 }
 
 bool KdTree::within(const Vec3f& query, float radius, std::size_t limit, std::vector<Neighbor>& found) const {

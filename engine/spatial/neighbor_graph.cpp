@@ -37,7 +37,7 @@ NeighborGraph build_neighbor_graph(const Points& points, std::uint32_t k, const 
   if (graph.k == 0) return graph;
 
   // Only distinct samples enter the tree: a pile of duplicates would make every query near it visit them all.
-  const KdTree tree(points, distinct.size() == points.size() ? std::vector<std::uint32_t>{} : distinct);
+  const KdTree tree = distinct.size() == points.size() ? KdTree(points) : KdTree(points, distinct);
   parallel_for(
       points.size(),
       [&](std::size_t begin, std::size_t end) {
