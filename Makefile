@@ -55,13 +55,10 @@ sample: build ## convert the Stanford dragon to build/data/dragon.drc
 	@.ci/setup web
 	@$(MAKE) --no-print-directory $(dragon)
 
-# The reconstruction is a mesh in text; the demo works on its vertices. Written aside first: half a file is never taken for a whole.
+# The reconstruction is a mesh; the demo works on its vertices.
 $(dragon): $(dragon_source)
 	@mkdir -p $(@D)
-	@gunzip -c $< >$(@D)/dragon.ply
-	@$(cli) convert $(@D)/dragon.ply $(@D)/dragon.partial.drc --draco-bits 16
-	@rm $(@D)/dragon.ply
-	@mv $(@D)/dragon.partial.drc $@
+	@$(cli) convert $< $@ --draco-bits 16
 
 demo: ## edit the Stanford dragon through the public HTTP API; pictures and result in build/demo
 	@.ci/setup build web view
