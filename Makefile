@@ -97,7 +97,7 @@ tidy: ## clang-tidy over every C++ source
 format: ## put every source file into its canonical form
 	@.ci/setup web lint
 	@git ls-files -z '*.h' '*.cpp' '*.inc' | xargs -0 clang-format-14 -i
-	@cd web && npm run --silent format
+	@for folder in web tests; do (cd $$folder && $(CURDIR)/web/node_modules/.bin/biome check --write); done
 
 check-arm64: ## compile the engine for arm64 (nothing is run)
 	@.ci/setup build arm64

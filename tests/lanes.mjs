@@ -27,14 +27,22 @@ async function cpp() {
   mkdirSync(junit, { recursive: true });
   const summary = resolve(release, "ctest.xml");
   rmSync(summary, { force: true });
-  const { status, output } = await run("ctest", ["--preset", "release", "--timeout", "900", "-j", String(jobs), "--output-junit", summary], {
-    timeoutSeconds: 3600,
-  });
+  const { status, output } = await run(
+    "ctest",
+    ["--preset", "release", "--timeout", "900", "-j", String(jobs), "--output-junit", summary],
+    {
+      timeoutSeconds: 3600,
+    },
+  );
   if (!existsSync(summary)) return { passed: 0, failed: 1, output };
   let passed = 0;
   let failed = 0;
-  const reports = new Map(readdirSync(junit).map((file) => [basename(file, ".xml"), readFileSync(resolve(junit, file), "utf8")]));
-  for (const [, name, outcome] of readFileSync(summary, "utf8").matchAll(/<testcase name="([^"]+)"[^>]*status="([^"]+)"/g)) {
+  const reports = new Map(
+    readdirSync(junit).map((file) => [basename(file, ".xml"), readFileSync(resolve(junit, file), "utf8")]),
+  );
+  for (const [, name, outcome] of readFileSync(summary, "utf8").matchAll(
+    /<testcase name="([^"]+)"[^>]*status="([^"]+)"/g,
+  )) {
     if (outcome === "disabled" || outcome === "notrun") continue;
     const report = reports.get(name);
     const cases = report ? report.split("<testcase").slice(1) : [];
@@ -50,7 +58,17 @@ async function cpp() {
 async function webUnit() {
   const report = resolve(root, "build/vitest.json");
   rmSync(report, { force: true });
-  const { output } = await run("node", ["node_modules/vitest/vitest.mjs", "run", "--reporter=default", "--reporter=json", `--outputFile.json=${report}`], { cwd: web });
+  const { output } = await run(
+    "node",
+    [
+      "node_modules/vitest/vitest.mjs",
+      "run",
+      "--reporter=default",
+      "--reporter=json",
+      `--outputFile.json=${report}`,
+    ],
+    { cwd: web },
+  );
   if (!existsSync(report)) return { passed: 0, failed: 1, output };
   const { numPassedTests, numFailedTests, success } = JSON.parse(readFileSync(report, "utf8"));
   return { passed: numPassedTests, failed: success ? 0 : Math.max(1, numFailedTests), output };
@@ -59,7 +77,9 @@ async function webUnit() {
 async function browser() {
   const files = await trackedFiles(/^tests\/web\/.*\.test\.(mjs|js)$/);
   if (files.length === 0) return { passed: 0, failed: 1, output: "    tests/web holds no *.test.mjs" };
-  const { status, output } = await run("node", ["--test", "--test-reporter=tap", ...files], { timeoutSeconds: 900 });
+  const { status, output } = await run("node", ["--test", "--test-reporter=tap", ...files], {
+    timeoutSeconds: 900,
+  });
   const total = (what) => Number(output.match(new RegExp(`^# ${what} (\\d+)$`, "m"))?.[1] ?? 0);
   const failed = total("fail") + total("cancelled");
   return { passed: total("pass"), failed: status !== 0 && failed === 0 ? 1 : failed, output };

@@ -28,7 +28,9 @@ if (wanted.includes("--list")) {
 }
 const unknown = wanted.filter((name) => !lanes.some((lane) => lane.name === name));
 if (unknown.length > 0) {
-  console.error(`no such lane: ${unknown.join(", ")} (there are ${lanes.map((lane) => lane.name).join(", ")})`);
+  console.error(
+    `no such lane: ${unknown.join(", ")} (there are ${lanes.map((lane) => lane.name).join(", ")})`,
+  );
   process.exit(2);
 }
 
@@ -52,7 +54,9 @@ for (const lane of lanes.filter(({ name }) => wanted.length === 0 || wanted.incl
 }
 
 const row = (name, passed, failed, seconds) =>
-  console.log(`${String(name).padEnd(12)} ${String(passed).padStart(7)} ${String(failed).padStart(7)} ${String(seconds).padStart(9)}`);
+  console.log(
+    `${String(name).padEnd(12)} ${String(passed).padStart(7)} ${String(failed).padStart(7)} ${String(seconds).padStart(9)}`,
+  );
 console.log();
 row("lane", "passed", "failed", "seconds");
 for (const { name, passed, failed, seconds } of results) row(name, passed, failed, seconds.toFixed(1));

@@ -3,7 +3,16 @@
 import { contentOf, together, trackedFiles, verdict } from "../support/process.mjs";
 
 const engineOrder = [
-  "core", "spatial", "normals", "smoothing", "simplification", "multires", "editing", "resampling", "transfer", "io",
+  "core",
+  "spatial",
+  "normals",
+  "smoothing",
+  "simplification",
+  "multires",
+  "editing",
+  "resampling",
+  "transfer",
+  "io",
 ]; // prettier-ignore
 
 /** Libraries, and where alone each may be included. What is not listed here (the standard library, Eigen) may be anywhere. */
@@ -19,7 +28,11 @@ const fenced = [
   { name: "Draco", header: /^draco\//, allowed: /^(engine\/io|tests)\// },
   { name: "nanoflann", header: /^nanoflann/, allowed: /^(engine\/spatial|tests)\// },
   { name: "TBB", header: /^(oneapi|tbb)\//, allowed: /^(engine\/core\/parallel|tests\/)/ },
-  { name: "threads", header: /^(thread|future|execution)$/, allowed: /^(engine\/core\/parallel|server\/|tests\/)/ },
+  {
+    name: "threads",
+    header: /^(thread|future|execution)$/,
+    allowed: /^(engine\/core\/parallel|server\/|tests\/)/,
+  },
   { name: "doctest", header: /^doctest\//, allowed: /^tests\// },
 ];
 /** Which top folder may include which. */
@@ -39,10 +52,12 @@ function complainAboutInclude(path, included, files) {
   if (!layers[layer].includes(targetLayer)) return `${layer}/ may not include ${targetLayer}/`;
   if (layer === "engine" && folder !== targetFolder) {
     const [from, to] = [engineOrder.indexOf(folder), engineOrder.indexOf(targetFolder)];
-    if (from === -1 || to === -1) return `engine/${from === -1 ? folder : targetFolder} has no place in the engine's order`;
+    if (from === -1 || to === -1)
+      return `engine/${from === -1 ? folder : targetFolder} has no place in the engine's order`;
     if (to > from) return `engine/${folder} comes before engine/${targetFolder} and may not include it`;
   }
-  if (layer === "tests" && folder === "engine" && targetLayer === "server") return "the engine's tests know nothing of the server";
+  if (layer === "tests" && folder === "engine" && targetLayer === "server")
+    return "the engine's tests know nothing of the server";
   return null;
 }
 
@@ -51,21 +66,27 @@ async function cppIncludes() {
   const files = new Set(paths);
   const complaints = [];
   for (const path of paths) {
-    contentOf(path).split("\n").forEach((line, i) => {
-      const match = line.match(/^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)/);
-      if (!match) return;
-      const [, own, system] = match;
-      if (own) {
-        const reason = complainAboutInclude(path, own, files);
-        if (reason) complaints.push(`${path}:${i + 1}: "${own}" ${reason}`);
-      } else {
-        for (const { name, header, allowed } of fenced) {
-          if (header.test(system) && !allowed.test(path)) complaints.push(`${path}:${i + 1}: <${system}>: ${name} may not be used here`);
+    contentOf(path)
+      .split("\n")
+      .forEach((line, i) => {
+        const match = line.match(/^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)/);
+        if (!match) return;
+        const [, own, system] = match;
+        if (own) {
+          const reason = complainAboutInclude(path, own, files);
+          if (reason) complaints.push(`${path}:${i + 1}: "${own}" ${reason}`);
+        } else {
+          for (const { name, header, allowed } of fenced) {
+            if (header.test(system) && !allowed.test(path))
+              complaints.push(`${path}:${i + 1}: <${system}>: ${name} may not be used here`);
+          }
         }
-      }
-    });
+      });
   }
-  return verdict(complaints, "The order is engine/core, …, engine/io, then protocol, then server (tests/gates/dependencies.mjs).");
+  return verdict(
+    complaints,
+    "The order is engine/core, …, engine/io, then protocol, then server (tests/gates/dependencies.mjs).",
+  );
 }
 
 /** The viewer speaks the protocol only: its sources import one another, three.js and nothing else. */

@@ -7,11 +7,18 @@ async function cpp() {
   const { status, output } = await run("clang-format-14", ["--dry-run", "--Werror", ...paths]);
   const files = new Set([...output.matchAll(/^(\S+?):\d+:\d+: error/gm)].map(([, path]) => path));
   if (status !== 0 && files.size === 0) return verdict([output]);
-  return verdict([...files].map((path) => `${path} is not in clang-format's form`), "`make format` puts them right.");
+  return verdict(
+    [...files].map((path) => `${path} is not in clang-format's form`),
+    "`make format` puts them right.",
+  );
 }
 
-async function web() {
-  const { status, output } = await run("node", ["node_modules/@biomejs/biome/bin/biome", "check", "--colors=off", "."], { cwd: resolve(root, "web") });
+/** Biome once per configuration: the viewer's folder, and the scripts of the tests. */
+async function web(folder) {
+  const biome = resolve(root, "web/node_modules/@biomejs/biome/bin/biome");
+  const { status, output } = await run("node", [biome, "check", "--colors=off"], {
+    cwd: resolve(root, folder),
+  });
   return verdict(status === 0 ? [] : [output.trim()], "`make format` puts most of it right.");
 }
 
@@ -27,5 +34,5 @@ async function shell() {
 }
 
 export async function format() {
-  return together([await cpp(), await web(), await shell()]);
+  return together([await cpp(), await web("web"), await web("tests"), await shell()]);
 }

@@ -1,7 +1,16 @@
 // Every header compiles alone: whoever includes it needs nothing before it. Remembered by content, as clang-tidy is.
 import { existsSync, mkdirSync, writeFileSync } from "node:fs";
 import { dirname, resolve } from "node:path";
-import { contentOf, digest, inParallel, root, run, trackedFiles, verdict, withProjectIncludes } from "../support/process.mjs";
+import {
+  contentOf,
+  digest,
+  inParallel,
+  root,
+  run,
+  trackedFiles,
+  verdict,
+  withProjectIncludes,
+} from "../support/process.mjs";
 import { compileFlags } from "./tidy.mjs";
 
 const cache = resolve(root, "build/checks/headers");
@@ -23,7 +32,10 @@ export async function headers() {
   const paths = await trackedFiles(/^(engine|protocol|server|tests)\/.*\.h$/);
   await inParallel(paths, async (path) => {
     const words = flagsFor(path, flags);
-    const stamp = resolve(cache, `${digest(path, version, words.join(" "), ...withProjectIncludes(path).map(contentOf))}.ok`);
+    const stamp = resolve(
+      cache,
+      `${digest(path, version, words.join(" "), ...withProjectIncludes(path).map(contentOf))}.ok`,
+    );
     if (existsSync(stamp)) return;
     const unit = resolve(cache, `${digest(path)}.cpp`);
     writeFileSync(unit, `#include "${path}"\n#include "${path}"\n`);

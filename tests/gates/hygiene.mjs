@@ -11,9 +11,11 @@ const maxBytes = 1024 * 1024;
 async function forbidden(pattern, reason, files = /./) {
   const complaints = [];
   for (const path of (await trackedFiles(files)).filter(isText)) {
-    contentOf(path).split("\n").forEach((line, i) => {
-      if (pattern.test(line)) complaints.push(`${path}:${i + 1}: ${reason}: ${line.trim().slice(0, 120)}`);
-    });
+    contentOf(path)
+      .split("\n")
+      .forEach((line, i) => {
+        if (pattern.test(line)) complaints.push(`${path}:${i + 1}: ${reason}: ${line.trim().slice(0, 120)}`);
+      });
   }
   return verdict(complaints);
 }
@@ -22,7 +24,8 @@ async function bigFiles() {
   const complaints = [];
   for (const path of await trackedFiles()) {
     const { size } = statSync(resolve(root, path));
-    if (size > maxBytes) complaints.push(`${path} has ${size} bytes; files above ${maxBytes} do not belong here`);
+    if (size > maxBytes)
+      complaints.push(`${path} has ${size} bytes; files above ${maxBytes} do not belong here`);
   }
   return verdict(complaints);
 }
@@ -38,7 +41,8 @@ async function sizes() {
   for (const { files, lines, except } of limits) {
     for (const path of await trackedFiles(files)) {
       const count = contentOf(path).split("\n").length - 1;
-      if (count > lines && !except?.test(path)) complaints.push(`${path} has ${count} lines, more than ${lines}: it holds more than one concept`);
+      if (count > lines && !except?.test(path))
+        complaints.push(`${path} has ${count} lines, more than ${lines}: it holds more than one concept`);
     }
   }
   return verdict(complaints);
@@ -50,8 +54,15 @@ async function conflictMarks() {
 
 export async function hygiene() {
   return together([
-    await forbidden(/registry\.[a-z0-9-]+\.[a-z]{2,}|\b(deb|security)\.debian[.]org|pypi[.]org|crates[.]io\b/, "a registry's host name"),
-    await forbidden(/(^|[\s"'`=(:,])\/(home|root|Users|work)\/[A-Za-z0-9._-]/, "a path of somebody's machine", /^(?!docker\/)/),
+    await forbidden(
+      /registry\.[a-z0-9-]+\.[a-z]{2,}|\b(deb|security)\.debian[.]org|pypi[.]org|crates[.]io\b/,
+      "a registry's host name",
+    ),
+    await forbidden(
+      /(^|[\s"'`=(:,])\/(home|root|Users|work)\/[A-Za-z0-9._-]/,
+      "a path of somebody's machine",
+      /^(?!docker\/)/,
+    ),
     await forbidden(/"resolved"\s*:/, "a resolved address", /(^|\/)package-lock\.json$/),
     await bigFiles(),
     await sizes(),

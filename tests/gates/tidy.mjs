@@ -6,20 +6,38 @@
 // clang-tidy itself change.
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { resolve } from "node:path";
-import { contentOf, digest, inParallel, jobs, root, run, trackedFiles, withProjectIncludes } from "../support/process.mjs";
+import {
+  contentOf,
+  digest,
+  inParallel,
+  jobs,
+  root,
+  run,
+  trackedFiles,
+  withProjectIncludes,
+} from "../support/process.mjs";
 
 const tool = "clang-tidy-14";
 const batchSize = 8;
 /** Tests are asked for their names and little else: the expression templates of their assertions are dear to analyse. */
-const testChecks = ["-*", "readability-identifier-naming", "google-build-using-namespace", "performance-for-range-copy"].join(",");
+const testChecks = [
+  "-*",
+  "readability-identifier-naming",
+  "google-build-using-namespace",
+  "performance-for-range-copy",
+].join(",");
 const cache = resolve(root, "build/checks/tidy");
 
 /** The compiler's flags per source, from the release build: everything but the compiler, -o, -c and the file. */
 export function compileFlags() {
   const flags = new Map();
-  for (const { file, command } of JSON.parse(readFileSync(resolve(root, "build/release/compile_commands.json"), "utf8"))) {
+  for (const { file, command } of JSON.parse(
+    readFileSync(resolve(root, "build/release/compile_commands.json"), "utf8"),
+  )) {
     const words = command.split(" ").slice(1);
-    const kept = words.filter((word, i) => word !== "-c" && word !== "-o" && words[i - 1] !== "-o" && words[i - 1] !== "-c");
+    const kept = words.filter(
+      (word, i) => word !== "-c" && word !== "-o" && words[i - 1] !== "-o" && words[i - 1] !== "-c",
+    );
     flags.set(file.startsWith(`${root}/`) ? file.slice(root.length + 1) : file, kept);
   }
   return flags;
@@ -29,7 +47,11 @@ export function compileFlags() {
 function namesDefined(path) {
   const names = new Set();
   for (const line of contentOf(path).split("\n")) {
-    if (!/^[A-Za-z_]/.test(line) || /^(namespace|using namespace|return|public|private|TEST_CASE)\b/.test(line)) continue;
+    if (
+      !/^[A-Za-z_]/.test(line) ||
+      /^(namespace|using namespace|return|public|private|TEST_CASE)\b/.test(line)
+    )
+      continue;
     for (const [, name] of line.matchAll(/\b([A-Za-z_]\w*)\s*(?=[({=;[]|$)/g)) names.add(name);
   }
   return names;
@@ -40,9 +62,12 @@ function batches(sources, flags) {
   // As many batches as there are processors, at least: two half batches in parallel beat a whole one alone.
   const size = Math.max(1, Math.min(batchSize, Math.ceil(sources.length / jobs)));
   for (const path of sources) {
-    const key = [path.startsWith("tests/") ? `--checks=${testChecks}` : "--quiet", ...flags.get(path)].join(" ");
+    const key = [path.startsWith("tests/") ? `--checks=${testChecks}` : "--quiet", ...flags.get(path)].join(
+      " ",
+    );
     const names = namesDefined(path);
-    const fits = (batch) => batch.key === key && batch.paths.length < size && ![...names].some((name) => batch.names.has(name));
+    const fits = (batch) =>
+      batch.key === key && batch.paths.length < size && ![...names].some((name) => batch.names.has(name));
     let batch = all.find(fits);
     if (!batch) all.push((batch = { key, paths: [], names: new Set() }));
     batch.paths.push(path);
@@ -55,12 +80,21 @@ async function check({ paths, key }) {
   const unit = resolve(cache, `${digest(...paths)}.cpp`);
   writeFileSync(unit, paths.map((path) => `#include "${path}"\n`).join(""));
   const [option, ...flags] = key.split(" ").filter((flag) => flag !== "-Werror");
-  const { status, output } = await run(tool, ["--quiet", option, unit, "--", ...flags, "-Wno-unknown-warning-option"], {
-    cwd: resolve(root, "build/release"),
-  });
+  const { status, output } = await run(
+    tool,
+    ["--quiet", option, unit, "--", ...flags, "-Wno-unknown-warning-option"],
+    {
+      cwd: resolve(root, "build/release"),
+    },
+  );
   const text = output
     .split("\n")
-    .filter((line) => !/^\d+ warnings? (and \d+ errors? )?generated|^Suppressed|^Use -header-filter|warnings treated as errors$/.test(line))
+    .filter(
+      (line) =>
+        !/^\d+ warnings? (and \d+ errors? )?generated|^Suppressed|^Use -header-filter|warnings treated as errors$/.test(
+          line,
+        ),
+    )
     .join("\n")
     .replaceAll(`${root}/`, "");
   return { status, text };
@@ -75,7 +109,10 @@ export async function tidy() {
   const stamps = new Map(
     sources.map((path) => {
       const texts = withProjectIncludes(path).map(contentOf);
-      return [path, resolve(cache, `${digest(version, config, testChecks, flags.get(path).join(" "), ...texts)}.ok`)];
+      return [
+        path,
+        resolve(cache, `${digest(version, config, testChecks, flags.get(path).join(" "), ...texts)}.ok`),
+      ];
     }),
   );
   const due = sources.filter((path) => !existsSync(stamps.get(path)));
@@ -86,13 +123,15 @@ export async function tidy() {
     // Sources that do not compile together (a clash that the names did not show) are checked one by one.
     if (batch.paths.length > 1 && outcomes[0].text.includes("clang-diagnostic-error")) {
       outcomes = [];
-      for (const path of batch.paths) outcomes.push({ paths: [path], ...(await check({ paths: [path], key: batch.key })) });
+      for (const path of batch.paths)
+        outcomes.push({ paths: [path], ...(await check({ paths: [path], key: batch.key })) });
     }
     for (const { paths, status, text } of outcomes) {
       if (status !== 0) complaints.add(text.trim());
       for (const path of paths) {
         const clean = status === 0 || !withProjectIncludes(path).some((part) => text.includes(`${part}:`));
-        if (clean && (status === 0 || /: (error|warning): /.test(text))) writeFileSync(stamps.get(path), path);
+        if (clean && (status === 0 || /: (error|warning): /.test(text)))
+          writeFileSync(stamps.get(path), path);
       }
     }
   });

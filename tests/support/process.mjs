@@ -12,7 +12,11 @@ export const jobs = Number(process.env.JOBS) || (availableParallelism?.() ?? cpu
 /** Runs a program to its end in the repository's root. Answers {status, output}; output is stdout and stderr in turn. */
 export function run(command, args, { cwd = root, env = {}, timeoutSeconds = 1800 } = {}) {
   return new Promise((done) => {
-    const child = spawn(command, args, { cwd, env: { ...process.env, ...env }, stdio: ["ignore", "pipe", "pipe"] });
+    const child = spawn(command, args, {
+      cwd,
+      env: { ...process.env, ...env },
+      stdio: ["ignore", "pipe", "pipe"],
+    });
     const chunks = [];
     child.stdout.on("data", (chunk) => chunks.push(chunk));
     child.stderr.on("data", (chunk) => chunks.push(chunk));
@@ -25,7 +29,9 @@ export function run(command, args, { cwd = root, env = {}, timeoutSeconds = 1800
       done({ status, output: Buffer.concat(chunks).toString("utf8") + extra });
     };
     child.on("error", (error) => finish(127, `${command}: ${error.message}\n`));
-    child.on("close", (code, signal) => finish(code ?? 1, signal ? `\n${command}: ended by ${signal}\n` : ""));
+    child.on("close", (code, signal) =>
+      finish(code ?? 1, signal ? `\n${command}: ended by ${signal}\n` : ""),
+    );
   });
 }
 
@@ -45,7 +51,14 @@ export async function inParallel(items, work) {
 
 /** The paths under version control (and new ones that are not ignored), relative to the root, that match. */
 export async function trackedFiles(pattern = /./) {
-  const { status, output } = await run("git", ["ls-files", "-z", "--cached", "--others", "--exclude-standard", "--deduplicate"]);
+  const { status, output } = await run("git", [
+    "ls-files",
+    "-z",
+    "--cached",
+    "--others",
+    "--exclude-standard",
+    "--deduplicate",
+  ]);
   if (status !== 0) throw new Error(`git ls-files failed:\n${output}`);
   return output
     .split("\0")
@@ -90,7 +103,13 @@ export function digest(...parts) {
 /** One gate's verdict as a lane result: a list of complaints, each naming file and reason. */
 export function verdict(complaints, advice = "") {
   if (complaints.length === 0) return { passed: 1, failed: 0, output: "" };
-  return { passed: 0, failed: 1, output: [...complaints.map((line) => `    ${line}`), advice && `    ${advice}`].filter(Boolean).join("\n") };
+  return {
+    passed: 0,
+    failed: 1,
+    output: [...complaints.map((line) => `    ${line}`), advice && `    ${advice}`]
+      .filter(Boolean)
+      .join("\n"),
+  };
 }
 
 /** Several verdicts as one lane. */
@@ -98,6 +117,9 @@ export function together(verdicts) {
   return {
     passed: verdicts.reduce((total, { passed }) => total + passed, 0),
     failed: verdicts.reduce((total, { failed }) => total + failed, 0),
-    output: verdicts.map(({ output }) => output).filter(Boolean).join("\n"),
+    output: verdicts
+      .map(({ output }) => output)
+      .filter(Boolean)
+      .join("\n"),
   };
 }
