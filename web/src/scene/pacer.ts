@@ -24,11 +24,12 @@ export interface PacerStep {
 }
 
 const REFINEMENTS = 16;
-const LEAST_REFINEMENTS = 6;
-const REFINEMENT_MS = 1500;
+const LEAST_REFINEMENTS = 4;
+const REFINEMENT_MS = 1200;
 const REST_MS = 110;
 const LEAST_BUDGET = 30_000;
-const SLOW_MS = 48;
+/** What a picture may take while things move. */
+const TARGET_MS = 40;
 const QUICK_MS = 22;
 
 /**
@@ -43,7 +44,6 @@ export class Pacer {
   private lastTick_ = 0;
   private lastChange_ = 0;
   private restSince_ = 0;
-  private moving_ = false;
 
   get settled(): boolean {
     return !this.changed_ && !this.partial_ && this.done(this.lastTick_);
@@ -59,19 +59,15 @@ export class Pacer {
   }
 
   next(now: number, samples: number): PacerStep {
-    const interval = now - this.lastTick_;
     this.lastTick_ = now;
     if (this.changed_) {
-      if (this.moving_ && interval < 1000) this.adapt(interval, samples);
       this.changed_ = false;
-      this.moving_ = true;
       this.lastChange_ = now;
       this.restSince_ = 0;
       this.index_ = 0;
       this.partial_ = this.budget_ < samples;
       return { kind: "picture", budget: this.budget_, index: 0, jitter: jitterOf(0) };
     }
-    this.moving_ = false;
     if (now - this.lastChange_ < REST_MS || (!this.partial_ && this.done(now))) {
       return { kind: "none", budget: 0, index: this.index_, jitter: [0, 0] };
     }
@@ -97,11 +93,12 @@ export class Pacer {
     return this.index_ >= LEAST_REFINEMENTS && this.restSince_ > 0 && now - this.restSince_ > REFINEMENT_MS;
   }
 
-  private adapt(interval: number, samples: number): void {
-    if (interval > SLOW_MS) {
-      this.budget_ = Math.max(LEAST_BUDGET, Math.min(this.budget_, samples) * 0.6);
-    } else if (interval < QUICK_MS && this.budget_ < samples) {
-      this.budget_ *= 1.25;
+  /** A picture of `drawn` of `samples` samples took `ms` on the GPU: the next ones while things move are cut to fit. */
+  finished(ms: number, drawn: number, samples: number): void {
+    if (ms > TARGET_MS) {
+      this.budget_ = Math.max(LEAST_BUDGET, drawn * Math.max(0.25, TARGET_MS / ms));
+    } else if (ms < QUICK_MS && this.budget_ < samples) {
+      this.budget_ *= 1.3;
       if (this.budget_ >= samples) this.budget_ = Number.POSITIVE_INFINITY;
     }
   }

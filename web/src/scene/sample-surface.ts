@@ -1,4 +1,4 @@
-import { type BufferAttribute, BufferGeometry, DataTexture, FloatType, GLBufferAttribute, NearestFilter, RGBAFormat } from "three";
+import { type BufferAttribute, BufferGeometry, DataTexture, FloatType, GLBufferAttribute, NearestFilter, RGBAFormat, Sphere } from "three";
 import { type LayerPrefix, layerPrefixes } from "./layers";
 
 /** What the surface needs to know of a frame before its blocks come. */
@@ -71,6 +71,8 @@ export class SampleSurface {
     this.blockTable.minFilter = NearestFilter;
     this.blockTable.magFilter = NearestFilter;
     this.blockTable.needsUpdate = true;
+    // Never asked for the samples' own bounds: they are on the GPU, and nothing is culled by them.
+    this.geometry.boundingSphere = new Sphere();
     this.allocate("positions");
     if (layout.hasNormals) this.allocate("normals");
     if (layout.hasDetail) this.allocate("detail");

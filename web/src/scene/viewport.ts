@@ -44,6 +44,7 @@ export class Viewport {
   private frame_ = 0;
   private timer_ = 0;
   private contextLost_ = false;
+  private fence_: { sync: WebGLSync; since: number; drawn: number } | null = null;
 
   constructor(container: HTMLElement) {
     this.container_ = container;
@@ -76,7 +77,7 @@ export class Viewport {
 
   /** Nothing waits to be drawn or refined. */
   get idle(): boolean {
-    return !this.contextLost_ && this.frame_ === 0 && this.timer_ === 0 && this.pacer_.settled;
+    return !this.contextLost_ && this.fence_ === null && this.frame_ === 0 && this.timer_ === 0 && this.pacer_.settled;
   }
 
   get loadedSamples(): number {
@@ -198,18 +199,33 @@ export class Viewport {
     this.frame_ = 0;
     clearTimeout(this.timer_);
     this.timer_ = 0;
+    // One picture at a time: what would pile up on a slow machine is never drawn, and a look at a pixel waits for one at most.
+    if (!this.pictureFinished(now)) {
+      this.schedule();
+      return;
+    }
     if (this.rig.update()) this.pacer_.change();
     const step = this.pacer_.next(now, this.surface_?.layout.sampleCount ?? 0);
-    if (step.kind !== "none") this.drawPicture(step.budget, step.index, step.jitter);
+    if (step.kind !== "none") this.drawPicture(step.budget, step.index, step.jitter, now);
     this.passes_.drawPresent(this.rig.camera);
     this.renderer_.render(this.overlay, this.rig.camera);
     this.onDrawn?.();
     const wait = this.pacer_.wait(performance.now());
-    if (wait === 0) this.schedule();
+    if (wait === 0 || this.fence_) this.schedule();
     else if (wait !== null) this.timer_ = window.setTimeout(() => { this.timer_ = 0; this.schedule(); }, wait);
   };
 
-  private drawPicture(budget: number, index: number, jitter: readonly [number, number]): void {
+  private pictureFinished(now: number): boolean {
+    if (!this.fence_) return true;
+    const { gl } = this;
+    if (gl.clientWaitSync(this.fence_.sync, 0, 0) === gl.TIMEOUT_EXPIRED) return false;
+    gl.deleteSync(this.fence_.sync);
+    this.pacer_.finished(now - this.fence_.since, this.fence_.drawn, this.surface_?.layout.sampleCount ?? 0);
+    this.fence_ = null;
+    return true;
+  }
+
+  private drawPicture(budget: number, index: number, jitter: readonly [number, number], now: number): void {
     const { camera } = this.rig;
     const { x: width, y: height } = this.passes_.viewport;
     const { splat, shade } = this.passes_;
@@ -226,6 +242,8 @@ export class Viewport {
     camera.clearViewOffset();
     this.picker_.setCamera(camera);
     if (index === 0) this.mask.redraw(camera);
+    const sync = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (sync) this.fence_ = { sync, since: now, drawn: prefix.samples };
   }
 
   private resize(): void {
@@ -244,6 +262,7 @@ export class Viewport {
     event.preventDefault();
     this.contextLost_ = true;
     this.surface_ = null;
+    this.fence_ = null;
     this.onContext?.(true);
   };
 

@@ -22,7 +22,7 @@ export function createDisplayPanel(bus: Bus, session: SessionDocument, options: 
   };
   const mode = selectField<DisplayMode>(
     "Show",
-    [["shaded", "Shaded surface"], ["color", "Own colours"], ["normals", "Normals"], ["t", "Scale parameter t"], ["detail", "Signed detail"]],
+    [["shaded", "Shaded"], ["color", "Colours"], ["normals", "Normals"], ["t", "Scale t"], ["detail", "Signed detail"]],
     settings.mode,
     (value) => change({ mode: value }),
   );

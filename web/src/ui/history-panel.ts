@@ -28,7 +28,9 @@ export function createHistoryPanel(bus: Bus): HTMLElement {
     const entries = history.edits.map((record) => entry(describeDeformation(record.edit.deformation), describe(record), record.index, history.head));
     replaceChildren(list, entry("As loaded", "", 0, history.head), ...entries);
     setText(section.aside, history.edits.length === 0 ? "" : `${history.head} / ${history.edits.length}`);
-    list.querySelector(".current")?.scrollIntoView({ block: "nearest" });
+    // Only the list scrolls to the current entry, never the panel.
+    const current = list.querySelector<HTMLElement>(".current");
+    if (current) list.scrollTop = current.offsetTop - list.clientHeight / 2;
   };
   bus.on("history.changed", show);
   show({ head: 0, edits: [] });

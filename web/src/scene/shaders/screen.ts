@@ -41,25 +41,32 @@ vec3 viewAt(vec2 pixel, float depth) {
               (ndc.y + projectionMatrix[2][1]) / projectionMatrix[1][1] * depth, -depth);
 }
 
-float eyeDome(vec2 pixel, float depth) {
+const vec2 DOME[8] = vec2[8](vec2(1.0, 0.0), vec2(0.707, 0.707), vec2(0.0, 1.0), vec2(-0.707, 0.707),
+                             vec2(-1.0, 0.0), vec2(-0.707, -0.707), vec2(0.0, -1.0), vec2(0.707, -0.707));
+
+float eyeDome(vec2 pixel, float depth, mat2 spin) {
   float sum = 0.0;
   float step = 1.4 * pixelRatio;
+  float own = log2(depth);
   for (int i = 0; i < 8; ++i) {
-    float a = float(i) * 0.785398 + turn;
-    float other = depthAt(pixel + step * vec2(cos(a), sin(a)));
-    if (other > 0.0) sum += max(0.0, log2(depth) - log2(other));
+    float other = depthAt(pixel + step * (spin * DOME[i]));
+    if (other > 0.0) sum += max(0.0, own - log2(other));
   }
   // Depths differ more between pixels the further away the object is: measured in parts of its size.
   return exp(-edl * sum * depth / objectRadius * 14.0);
 }
 
-float occlusion(vec2 pixel, vec3 at, vec3 n) {
+// A spiral of ten places that covers the disc evenly.
+const vec2 SPIRAL[10] = vec2[10](vec2(0.224, 0.0), vec2(-0.286, 0.262), vec2(0.044, -0.498), vec2(0.360, 0.470),
+                                 vec2(-0.661, -0.117), vec2(0.626, -0.398), vec2(-0.209, 0.779), vec2(-0.381, -0.777),
+                                 vec2(0.840, 0.379), vec2(-0.880, 0.428));
+
+float occlusion(vec2 pixel, vec3 at, vec3 n, mat2 spin) {
   float reach = 0.085 * objectRadius;
   float pixels = clamp(reach * projectionMatrix[1][1] * viewport.y * 0.5 / -at.z, 4.0, 90.0 * pixelRatio);
   float sum = 0.0;
   for (int i = 0; i < 10; ++i) {
-    float a = float(i) * 2.399963 + turn * 3.0;
-    vec2 place = pixel + pixels * sqrt((float(i) + 0.5) / 10.0) * vec2(cos(a), sin(a));
+    vec2 place = pixel + pixels * (spin * SPIRAL[i]);
     float other = depthAt(place);
     if (other <= 0.0) continue;
     vec3 to = viewAt(place, other) - at;
@@ -86,7 +93,8 @@ void main() {
     vec3 n = normalize(texelFetch(normals, ivec2(pixel), 0).xyz);
     vec3 at = viewAt(pixel, depth);
     vec3 eye = normalize(-at);
-    float open = edl > 0.0 ? occlusion(pixel, at, n) : 1.0;
+    mat2 spin = mat2(cos(turn), sin(turn), -sin(turn), cos(turn));
+    float open = edl > 0.0 ? occlusion(pixel, at, n, spin) : 1.0;
     vec3 up = normalize(mat3(viewMatrix) * vec3(0.0, 1.0, 0.0));
     float sky = dot(n, up) * 0.5 + 0.5;
     vec3 ambient = mix(vec3(0.115, 0.108, 0.105), vec3(0.30, 0.325, 0.365), sky) * open;
@@ -99,7 +107,7 @@ void main() {
     vec3 lit = base * light + (vec3(0.30, 0.36, 0.44) * rim * 0.55 + shine) * open;
     vec3 plain = base * (0.42 + 0.58 * mix(max(0.0, dot(n, eye)), key, 0.35)) * mix(0.7, 1.0, open);
     color = mix(lit, plain, dataMode);
-    if (edl > 0.0) color *= mix(eyeDome(pixel, depth), 1.0, 0.18);
+    if (edl > 0.0) color *= mix(eyeDome(pixel, depth, spin), 1.0, 0.18);
   }
   outColor = vec4(color, blend);
 }
