@@ -18,8 +18,6 @@ async function make(...targets) {
   return verdict(status === 0 ? [] : [output.trim()]);
 }
 
-const count = (text, pattern) => [...text.matchAll(pattern)].length;
-
 /** Every doctest case and every other ctest entry. A binary that ends badly without saying which case failed counts as one failure. */
 async function cpp() {
   const junit = resolve(release, "junit");

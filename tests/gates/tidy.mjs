@@ -69,7 +69,10 @@ function batches(sources, flags) {
     const fits = (batch) =>
       batch.key === key && batch.paths.length < size && ![...names].some((name) => batch.names.has(name));
     let batch = all.find(fits);
-    if (!batch) all.push((batch = { key, paths: [], names: new Set() }));
+    if (!batch) {
+      batch = { key, paths: [], names: new Set() };
+      all.push(batch);
+    }
     batch.paths.push(path);
     for (const name of names) batch.names.add(name);
   }
