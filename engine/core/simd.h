@@ -143,22 +143,35 @@ POINTWRIGHT_SIMD_INLINE F gather(const float* base, I index) {
 #endif
 }
 
-/// Whether a lane (every lane) of the mask is true.
-POINTWRIGHT_SIMD_INLINE bool any(Mask m) {
+/// The lanes of the mask as bits, lane 0 the lowest.
+POINTWRIGHT_SIMD_INLINE std::uint32_t mask_bits(Mask m) {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
-  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(m)) != 0;
+  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(m));
 #elif defined(__AVX2__)
-  return _mm256_movemask_ps(reinterpret_cast<__m256>(m)) != 0;
+  return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(m)));
 #elif defined(__x86_64__)
-  return _mm_movemask_ps(reinterpret_cast<__m128>(m)) != 0;
+  return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(m)));
 #else
-  std::int32_t joined = 0;
-  for (std::size_t lane = 0; lane < kWidth; ++lane) joined |= m[lane];
-  return joined != 0;
+  std::uint32_t joined = 0;
+  for (std::size_t lane = 0; lane < kWidth; ++lane) joined |= static_cast<std::uint32_t>(m[lane] & 1) << lane;
+  return joined;
 #endif
 }
+/// Whether a lane (every lane) of the mask is true.
+POINTWRIGHT_SIMD_INLINE bool any(Mask m) {
+  return mask_bits(m) != 0;
+}
 POINTWRIGHT_SIMD_INLINE bool all(Mask m) {
-  return !any(~m);
+  return mask_bits(~m) == 0;
+}
+
+/// mask_bits(a <= b), without the detour over a vector where comparisons give bits.
+POINTWRIGHT_SIMD_INLINE std::uint32_t less_equal_bits(F a, F b) {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return _mm512_cmp_ps_mask(reinterpret_cast<__m512>(a), reinterpret_cast<__m512>(b), _CMP_LE_OQ);
+#else
+  return mask_bits(a <= b);
+#endif
 }
 
 /// The nearest integer, ties to even. Pre: |v| <= 2^22.

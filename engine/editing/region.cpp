@@ -16,9 +16,9 @@ namespace pointwright {
 
 // The balls in coherent order under an implicit tree (region_kernels.h says how nodes are laid out).
 struct Region::Tree {
-  std::vector<Ball> ball;
-  std::vector<std::int32_t> id;     // of the ball in a slot
-  std::vector<std::uint32_t> slot;  // of the ball with an id
+  std::size_t count = 0;
+  std::vector<BallLeaf> leaf;
+  std::vector<std::uint32_t> slot;  // leaf * kBallFanout + place of the ball with an id
   std::vector<BallNode> node;
   BallTreeView view{};
 
@@ -27,88 +27,90 @@ struct Region::Tree {
 
 namespace {
 
-BallNode empty_node() {
-  constexpr float kMax = std::numeric_limits<float>::max();
-  return {kMax, kMax, kMax, 0.0F, -kMax, -kMax, -kMax, 0.0F};
-}
+constexpr std::int32_t kNoBall = std::numeric_limits<std::int32_t>::max();
 
-void extend(BallNode& node, const Ball& ball) {
-  node.min_x = std::min(node.min_x, ball.x);
-  node.min_y = std::min(node.min_y, ball.y);
-  node.min_z = std::min(node.min_z, ball.z);
-  node.max_x = std::max(node.max_x, ball.x);
-  node.max_y = std::max(node.max_y, ball.y);
-  node.max_z = std::max(node.max_z, ball.z);
-  node.max_radius = std::max(node.max_radius, ball.radius);
-}
+struct Bounds {
+  Box3f box;
+  float radius = std::numeric_limits<float>::quiet_NaN();
 
-void extend(BallNode& node, const BallNode& child) {
-  extend(node, Ball{child.min_x, child.min_y, child.min_z, child.max_radius});
-  extend(node, Ball{child.max_x, child.max_y, child.max_z, child.max_radius});
-}
-
-// A list of the children of node `index` on a level above the leaves, or of the balls of a leaf.
-struct Range {
-  std::size_t begin;
-  std::size_t end;
+  void extend(const Bounds& other) {
+    box.min = box.min.cwiseMin(other.box.min);
+    box.max = box.max.cwiseMax(other.box.max);
+    radius = std::isnan(radius) ? other.radius : std::max(radius, other.radius);
+  }
 };
-Range children(std::size_t index, std::size_t fanout, std::size_t count) {
-  return {index * fanout, std::min((index + 1) * fanout, count)};
+
+Bounds bounds_of_leaf(const BallLeaf& leaf) {
+  Bounds bounds;
+  for (std::size_t b = 0; b < kBallFanout && leaf.id[b] != kNoBall; ++b) {
+    const Vec3f center(leaf.x[b], leaf.y[b], leaf.z[b]);
+    bounds.extend({.box = {.min = center, .max = center}, .radius = leaf.radius[b]});
+  }
+  return bounds;
 }
 
-// The distance to one ball, and the displacement from its centre: the operations of region_kernels.inc, in
-// its order.
-struct BallDistance {
-  float distance, dx, dy, dz, length;
-};
-BallDistance distance_to(const Ball& ball, const Vec3f& p) {
-  const float dx = p.x() - ball.x;
-  const float dy = p.y() - ball.y;
-  const float dz = p.z() - ball.z;
-  const float length = std::sqrt(dx * dx + dy * dy + dz * dz);
-  return {std::max(length - ball.radius, 0.0F), dx, dy, dz, length};
+Bounds bounds_of_node(const BallNode& node) {
+  Bounds bounds;
+  for (std::size_t c = 0; c < kBallFanout && !std::isnan(node.max_radius[c]); ++c) {
+    bounds.extend({.box = {.min = Vec3f(node.min_x[c], node.min_y[c], node.min_z[c]),
+                           .max = Vec3f(node.max_x[c], node.max_y[c], node.max_z[c])},
+                   .radius = node.max_radius[c]});
+  }
+  return bounds;
 }
 
-float bound_of(const BallNode& node, const Vec3f& p) {
-  const float dx = std::max(std::max(node.min_x - p.x(), p.x() - node.max_x), 0.0F);
-  const float dy = std::max(std::max(node.min_y - p.y(), p.y() - node.max_y), 0.0F);
-  const float dz = std::max(std::max(node.min_z - p.z(), p.z() - node.max_z), 0.0F);
-  return std::max(std::sqrt(dx * dx + dy * dy + dz * dz) - node.max_radius, 0.0F);
+void set_child(BallNode& node, std::size_t c, const Bounds& bounds) {
+  node.min_x[c] = bounds.box.min.x();
+  node.min_y[c] = bounds.box.min.y();
+  node.min_z[c] = bounds.box.min.z();
+  node.max_x[c] = bounds.box.max.x();
+  node.max_y[c] = bounds.box.max.y();
+  node.max_z[c] = bounds.box.max.z();
+  node.max_radius[c] = bounds.radius;
+}
+
+// Nodes over `children` items, sixteen to a node, from the bounds of each; missing children have no bounds.
+template <typename ChildBounds>
+void fill_nodes(BallNode* nodes, std::size_t children, const ChildBounds& bounds_of_child) {
+  const std::size_t count = (children + kBallFanout - 1) / kBallFanout;
+  parallel_for(
+      count,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin * kBallFanout; i < end * kBallFanout; ++i) {
+          set_child(nodes[i / kBallFanout], i % kBallFanout, i < children ? bounds_of_child(i) : Bounds{});
+        }
+      },
+      64);
+}
+
+BallLeaf empty_leaf() {
+  BallLeaf leaf{};
+  std::fill(std::begin(leaf.radius), std::end(leaf.radius), -std::numeric_limits<float>::infinity());
+  std::fill(std::begin(leaf.id), std::end(leaf.id), kNoBall);
+  return leaf;
 }
 
 }  // namespace
 
 void Region::Tree::build_nodes() {
-  std::size_t count = (ball.size() + kBallsPerLeaf - 1) / kBallsPerLeaf;
-  std::size_t total = 0;
   view = {};
-  for (std::size_t size = count;; size = (size + kBallTreeFanout - 1) / kBallTreeFanout) {
+  std::size_t total = 0;
+  for (std::size_t children = leaf.size();; children = (children + kBallFanout - 1) / kBallFanout) {
     POINTWRIGHT_CHECK(view.level_count < kBallTreeMaxLevels, "fewer than 2^29 balls");
-    view.level_begin[view.level_count] = static_cast<std::uint32_t>(total);
-    view.level_size[view.level_count] = static_cast<std::uint32_t>(size);
-    ++view.level_count;
-    total += size;
-    if (size <= 1) break;
+    view.level_begin[view.level_count++] = static_cast<std::uint32_t>(total);
+    total += (children + kBallFanout - 1) / kBallFanout;
+    if (children <= kBallFanout) break;
   }
-  node.assign(total, empty_node());
-  parallel_for(count, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Range balls = children(i, kBallsPerLeaf, ball.size());
-      for (std::size_t b = balls.begin; b < balls.end; ++b) extend(node[i], ball[b]);
-    }
-  });
+  node.resize(total);
+  fill_nodes(node.data(), leaf.size(), [&](std::size_t i) { return bounds_of_leaf(leaf[i]); });
   for (std::size_t level = 1; level < view.level_count; ++level) {
-    for (std::size_t i = 0; i < view.level_size[level]; ++i) {
-      const Range nodes = children(i, kBallTreeFanout, view.level_size[level - 1]);
-      for (std::size_t c = nodes.begin; c < nodes.end; ++c) {
-        extend(node[view.level_begin[level] + i], node[view.level_begin[level - 1] + c]);
-      }
-    }
+    const BallNode* below = &node[view.level_begin[level - 1]];
+    fill_nodes(&node[view.level_begin[level]], view.level_begin[level] - view.level_begin[level - 1],
+               [&](std::size_t i) { return bounds_of_node(below[i]); });
   }
-  view.ball = ball.data();
-  view.id = id.data();
+  view.leaf = leaf.data();
   view.node = node.data();
-  view.ball_count = static_cast<std::uint32_t>(ball.size());
+  view.leaf_count = static_cast<std::uint32_t>(leaf.size());
 }
 
 Region::Region(const Points& centers, const std::vector<float>& radii, BallOrder order) {
@@ -118,20 +120,20 @@ Region::Region(const Points& centers, const std::vector<float>& radii, BallOrder
   if (m == 0) return;
   const auto tree = std::make_shared<Tree>();
   std::vector<std::uint32_t> sorted;
-  if (order == BallOrder::kAny) {
-    sorted = coherent_order(centers);
-  } else {
-    sorted.resize(m);
-    std::iota(sorted.begin(), sorted.end(), 0U);
-  }
-  tree->ball.resize(m);
-  tree->id.resize(m);
+  if (order == BallOrder::kAny) sorted = coherent_order(centers);
+  tree->count = m;
+  tree->leaf.assign((m + kBallFanout - 1) / kBallFanout, empty_leaf());
   tree->slot.resize(m);
   parallel_for(m, [&](std::size_t begin, std::size_t end) {
     for (std::size_t slot = begin; slot < end; ++slot) {
-      const std::uint32_t i = sorted[slot];
-      tree->ball[slot] = {centers.x()[i], centers.y()[i], centers.z()[i], radii[i]};
-      tree->id[slot] = static_cast<std::int32_t>(i);
+      const std::size_t i = sorted.empty() ? slot : sorted[slot];
+      BallLeaf& leaf = tree->leaf[slot / kBallFanout];
+      const std::size_t b = slot % kBallFanout;
+      leaf.x[b] = centers.x()[i];
+      leaf.y[b] = centers.y()[i];
+      leaf.z[b] = centers.z()[i];
+      leaf.radius[b] = radii[i];
+      leaf.id[b] = static_cast<std::int32_t>(i);
       tree->slot[i] = static_cast<std::uint32_t>(slot);
     }
   });
@@ -144,8 +146,8 @@ Region Region::with_radii(const std::vector<float>& radii) const {
   Region result;
   if (empty()) return result;
   const auto tree = std::make_shared<Tree>(*tree_);
-  for (std::size_t slot = 0; slot < tree->ball.size(); ++slot) {
-    tree->ball[slot].radius = radii[static_cast<std::size_t>(tree->id[slot])];
+  for (std::size_t i = 0; i < tree->count; ++i) {
+    tree->leaf[tree->slot[i] / kBallFanout].radius[tree->slot[i] % kBallFanout] = radii[i];
   }
   tree->build_nodes();
   result.tree_ = tree;
@@ -153,66 +155,24 @@ Region Region::with_radii(const std::vector<float>& radii) const {
 }
 
 std::size_t Region::size() const {
-  return tree_ == nullptr ? 0 : tree_->ball.size();
+  return tree_ == nullptr ? 0 : tree_->count;
 }
 
 Vec3f Region::center(std::size_t i) const {
-  const Ball& ball = tree_->ball[tree_->slot[i]];
-  return {ball.x, ball.y, ball.z};
+  const BallLeaf& leaf = tree_->leaf[tree_->slot[i] / kBallFanout];
+  const std::size_t b = tree_->slot[i] % kBallFanout;
+  return {leaf.x[b], leaf.y[b], leaf.z[b]};
 }
 
 float Region::radius(std::size_t i) const {
-  return tree_->ball[tree_->slot[i]].radius;
+  return tree_->leaf[tree_->slot[i] / kBallFanout].radius[tree_->slot[i] % kBallFanout];
 }
 
 RegionDistance Region::distance(const Vec3f& p, std::uint32_t& hint) const {
   POINTWRIGHT_CHECK(!empty(), "a region without balls has no distance");
-  const BallTreeView& tree = tree_->view;
-  float best = std::numeric_limits<float>::infinity();
-  std::int32_t best_id = std::numeric_limits<std::int32_t>::max();
-  std::size_t best_slot = 0;
-  const auto visit_leaf = [&](std::size_t leaf) {
-    const Range balls = children(leaf, kBallsPerLeaf, tree.ball_count);
-    for (std::size_t slot = balls.begin; slot < balls.end; ++slot) {
-      const float d = distance_to(tree.ball[slot], p).distance;
-      if (d < best || (d == best && tree.id[slot] < best_id)) {
-        best = d;
-        best_id = tree.id[slot];
-        best_slot = slot;
-      }
-    }
-  };
-  struct Visit {
-    std::uint32_t level;
-    std::uint32_t index;
-    float bound;
-  };
-  std::array<Visit, std::size_t{kBallTreeMaxLevels} * kBallTreeFanout> stack;
-  std::size_t depth = 0;
-  stack[depth++] = {tree.level_count - 1, 0, 0.0F};
-  visit_leaf(hint < tree.level_size[0] ? hint : 0);
-  while (depth > 0 && best > 0.0F) {
-    const Visit visit = stack[--depth];
-    if (visit.bound > best) continue;
-    if (visit.level == 0) {
-      visit_leaf(visit.index);
-      continue;
-    }
-    const std::uint32_t level = visit.level - 1;
-    const Range nodes = children(visit.index, kBallTreeFanout, tree.level_size[level]);
-    const std::size_t bottom = depth;
-    for (std::size_t child = nodes.begin; child < nodes.end; ++child) {
-      const float bound = bound_of(tree.node[tree.level_begin[level] + child], p);
-      if (bound > best) continue;
-      std::size_t place = depth++;  // the nearest child last: it is visited first
-      for (; place > bottom && stack[place - 1].bound < bound; --place) stack[place] = stack[place - 1];
-      stack[place] = {level, static_cast<std::uint32_t>(child), bound};
-    }
-  }
-  hint = static_cast<std::uint32_t>(best_slot / kBallsPerLeaf);
-  if (best <= 0.0F) return {};
-  const BallDistance found = distance_to(tree.ball[best_slot], p);
-  return {best, Vec3f(found.dx / found.length, found.dy / found.length, found.dz / found.length)};
+  std::array<float, 4> result{};
+  POINTWRIGHT_KERNEL(query_ball)(tree_->view, p.data(), hint, result.data());
+  return {result[0], Vec3f(result[1], result[2], result[3])};
 }
 
 void Region::distances(const Points& points, std::size_t begin, std::size_t end,
@@ -229,7 +189,7 @@ void Region::distances(const Points& points, std::size_t begin, std::size_t end,
                             .gradient_x = result.gradient.x(),
                             .gradient_y = result.gradient.y(),
                             .gradient_z = result.gradient.z()};
-  POINTWRIGHT_KERNEL(query_balls)(tree_->view, queries, 0, padded_to_block(count));
+  POINTWRIGHT_KERNEL(query_balls)(tree_->view, queries, padded_to_block(count));
 }
 
 namespace {

@@ -1,5 +1,6 @@
 #pragma once
-// Distance queries of sixteen coherent points at a time against a tree of balls (engine/editing/region.h).
+// Distance queries against a tree of balls (engine/editing/region.h): sixteen coherent points at a time, or
+// one.
 
 #include <cstddef>
 #include <cstdint>
@@ -8,32 +9,33 @@
 
 namespace pointwright {
 
-/// Balls per leaf and children per inner node of the implicit tree.
-inline constexpr std::uint32_t kBallsPerLeaf = 8;
-inline constexpr std::uint32_t kBallTreeFanout = 4;
+/// Balls of a leaf and children of an inner node.
+inline constexpr std::uint32_t kBallFanout = 16;
 /// Enough for 2^29 balls.
-inline constexpr std::uint32_t kBallTreeMaxLevels = 16;
+inline constexpr std::uint32_t kBallTreeMaxLevels = 8;
 
-struct Ball {
-  float x, y, z, radius;
+/// Sixteen balls; a missing one has the radius -infinity and the largest id.
+struct BallLeaf {
+  float x[kBallFanout], y[kBallFanout], z[kBallFanout], radius[kBallFanout];
+  std::int32_t id[kBallFanout];  ///< index in the caller's order
 };
 
-/// Bounds of a run of balls: the box of the centres and the largest radius.
+/// The bounds of sixteen children: boxes of the centres and the largest radii. A missing child has a NaN
+/// radius.
 struct BallNode {
-  float min_x, min_y, min_z, max_radius;
-  float max_x, max_y, max_z, unused;
+  float min_x[kBallFanout], min_y[kBallFanout], min_z[kBallFanout];
+  float max_x[kBallFanout], max_y[kBallFanout], max_z[kBallFanout];
+  float max_radius[kBallFanout];
 };
 
-/// The tree: leaf j (level 0) holds balls [j * kBallsPerLeaf, ...), node j of level l + 1 the nodes
-/// [j * kBallTreeFanout, ...) of level l. The top level has one node.
+/// An implicit tree: node j of level 0 bounds the leaves [16 j, 16 j + 16), node j of level l + 1 the nodes
+/// [16 j, 16 j + 16) of level l. The top level has one node.
 struct BallTreeView {
-  const Ball* ball;
-  const std::int32_t* id;  ///< index of each ball in its caller's order
+  const BallLeaf* leaf;
   const BallNode* node;
-  std::uint32_t ball_count;
+  std::uint32_t leaf_count;
   std::uint32_t level_count;
   std::uint32_t level_begin[kBallTreeMaxLevels];  ///< first node of each level
-  std::uint32_t level_size[kBallTreeMaxLevels];
 };
 
 /// Columns of whole SIMD blocks; results of point i go to entry i.
@@ -49,6 +51,10 @@ struct BallQueries {
 
 }  // namespace pointwright
 
-/// Distances and gradients of the points [begin, end), both multiples of 16, by region.h's definition.
+/// Distances and gradients of the points [0, count), count a multiple of 16, by region.h's definition.
 POINTWRIGHT_DECLARE_KERNEL(void query_balls(const BallTreeView& tree, const BallQueries& queries,
-                                            std::size_t begin, std::size_t end))
+                                            std::size_t count))
+/// The same for one point: distance, then gradient, into `result`. `hint` is a leaf: in, a guess; out, the
+/// nearest's.
+POINTWRIGHT_DECLARE_KERNEL(void query_ball(const BallTreeView& tree, const float* point, std::uint32_t& hint,
+                                           float* result))

@@ -15,7 +15,7 @@ struct SimdProbe {
   float* out = nullptr;                  ///< kSimdProbeColumns columns of `count`
   std::size_t count = 0;                 ///< a multiple of 16
 };
-inline constexpr std::size_t kSimdProbeColumns = 16;
+inline constexpr std::size_t kSimdProbeColumns = 17;
 
 }  // namespace pointwright
 
