@@ -1,6 +1,7 @@
 #pragma once
 // A column of 3-vectors as three float arrays, padded to whole SIMD blocks.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -48,7 +49,13 @@ class Points {
   [[nodiscard]] float* y() { return y_.data(); }
   [[nodiscard]] float* z() { return z_.data(); }
 
-  friend bool operator==(const Points&, const Points&) = default;
+  /// Of the points alone: what the padding holds does not count.
+  friend bool operator==(const Points& a, const Points& b) {
+    const auto same = [&](const std::vector<float>& u, const std::vector<float>& v) {
+      return std::equal(u.begin(), u.begin() + static_cast<std::ptrdiff_t>(a.count_), v.begin());
+    };
+    return a.count_ == b.count_ && same(a.x_, b.x_) && same(a.y_, b.y_) && same(a.z_, b.z_);
+  }
 
  private:
   std::size_t count_ = 0;

@@ -37,6 +37,17 @@ TEST_CASE("a point reads as it was set") {
   }
 }
 
+TEST_CASE("points are equal where their samples are, whatever the padding holds") {
+  Points a(5);
+  Points b(5);
+  b.x()[5] = 1.0F;  // padding
+  CHECK(a == b);
+  b.y()[4] = 1.0F;
+  CHECK_FALSE(a == b);
+  CHECK_FALSE(Points(5) == Points(6));
+  CHECK(Points() == Points());
+}
+
 TEST_CASE("bounds enclose every point and nothing more") {
   Points points(3);
   points.set(0, {1.0F, -2.0F, 3.0F});
