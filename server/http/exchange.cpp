@@ -1,13 +1,10 @@
 #include "server/http/exchange.h"
 
-#include <sys/random.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdio>
-#include <stdexcept>
 
+#include "server/base/random_id.h"
 #include "server/http/problem_response.h"
 
 namespace pointwright::server {
@@ -52,30 +49,6 @@ std::chrono::milliseconds time_for(std::uint64_t bytes, std::uint64_t rate) {
 }
 
 }  // namespace
-
-std::string random_id() {
-  std::array<unsigned char, 16> bits{};
-  std::size_t have = 0;
-  while (have < bits.size()) {
-    const ssize_t count = ::getrandom(bits.data() + have, bits.size() - have, 0);
-    if (count < 0 && errno != EINTR) throw std::runtime_error("the kernel gives no random numbers");
-    if (count > 0) have += static_cast<std::size_t>(count);
-  }
-  constexpr std::string_view kAlphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
-  std::string id;
-  unsigned accumulator = 0;
-  int held = 0;
-  for (const unsigned char byte : bits) {
-    accumulator = (accumulator << 8U | byte) & 0xffffU;
-    held += 8;
-    while (held >= 6) {
-      held -= 6;
-      id.push_back(kAlphabet[accumulator >> static_cast<unsigned>(held) & 63U]);
-    }
-  }
-  id.push_back(kAlphabet[accumulator << static_cast<unsigned>(6 - held) & 63U]);
-  return id;
-}
 
 Exchange::Exchange(const ExchangeContext& context, Connection& connection, bool refuse)
     : context_(context),

@@ -65,7 +65,4 @@ class Exchange {
   RequestLog log_;
 };
 
-/// 22 characters of base64url: 128 bits from the kernel.
-std::string random_id();
-
 }  // namespace pointwright::server

@@ -31,7 +31,7 @@ struct HttpOptions {
 
 /// One finished request, for the log.
 struct RequestLog {
-  std::string request_id, method, path, route, remote;
+  std::string request_id, method, path, route;
   int status = 0;
   double duration_ms = 0.0;
   std::uint64_t request_bytes = 0;

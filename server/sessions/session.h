@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "server/problem/outcome.h"
+#include "server/base/outcome.h"
 #include "server/sessions/compute_pool.h"
 #include "server/sessions/display.h"
 #include "server/sessions/document.h"
@@ -46,6 +46,7 @@ class Session : public std::enable_shared_from_this<Session> {
   static std::shared_ptr<Session> create(SessionParams params, SessionServices services);
 
   [[nodiscard]] const std::string& id() const { return params_.id; }
+  [[nodiscard]] const std::string& name() const { return params_.name; }
   [[nodiscard]] const std::string& cloud_id() const { return params_.cloud_id; }
   [[nodiscard]] const Cloud& cloud() const { return *params_.cloud; }
   [[nodiscard]] SharedDocument document() const;
@@ -81,9 +82,15 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// The committed state with `level` valid; with t where the regions allow it.
   Outcome<Picture> committed_picture(std::uint32_t level, bool with_t);
+  struct EditedCloud {
+    std::shared_ptr<const Cloud> cloud;
+    std::uint64_t revision = 0;
+  };
   /// The cloud as edited: the upload's columns in coherent order, moved samples at their new places on
   /// `level`.
-  Outcome<std::shared_ptr<const Cloud>> edited_cloud(std::uint32_t level);
+  Outcome<EditedCloud> edited_cloud(std::uint32_t level);
+  /// Those frame attributes that there is something to fill with.
+  [[nodiscard]] std::uint16_t available_attributes(std::uint16_t asked) const;
 
   [[nodiscard]] Display& display() { return display_; }
   [[nodiscard]] Feed& feed() { return feed_; }

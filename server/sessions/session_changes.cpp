@@ -175,7 +175,7 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
   });
 }
 
-Outcome<std::shared_ptr<const Cloud>> Session::edited_cloud(std::uint32_t level) {
+Outcome<Session::EditedCloud> Session::edited_cloud(std::uint32_t level) {
   auto picture = committed_picture(level, false);
   if (!picture.ok()) return picture.problem();
   const Level& now = picture.value().surface->levels[level];
@@ -191,7 +191,12 @@ Outcome<std::shared_ptr<const Cloud>> Session::edited_cloud(std::uint32_t level)
   });
   cloud->position = now.position;
   cloud->normal = now.normal;
-  return std::shared_ptr<const Cloud>(std::move(cloud));
+  return EditedCloud{.cloud = std::move(cloud), .revision = picture.value().revision};
+}
+
+std::uint16_t Session::available_attributes(std::uint16_t asked) const {
+  if (params_.cloud->has_colors()) return asked;
+  return static_cast<std::uint16_t>(asked & ~unsigned{protocol::kFrameColor});
 }
 
 }  // namespace pointwright::server

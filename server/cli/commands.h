@@ -1,0 +1,14 @@
+#pragma once
+// The command-line tool; main() only calls it.
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+namespace pointwright::server {
+
+/// Runs `pointwright` with the arguments after its name. Returns the exit status: 0, 1 where the work failed,
+/// 2 where the arguments are wrong.
+int run_command(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err);
+
+}  // namespace pointwright::server

@@ -1,0 +1,47 @@
+#pragma once
+// The handlers, by resource. Each answers one row of routes/routes.cpp.
+
+#include "server/handlers/service.h"
+
+namespace pointwright::server {
+
+// info.cpp
+Response get_service(Service& service, const Request& request);
+Response get_health(Service& service, const Request& request);
+Response get_readiness(Service& service, const Request& request);
+Response get_info(Service& service, const Request& request);
+Response get_problem(Service& service, const Request& request);
+Response get_openapi_yaml(Service& service, const Request& request);
+Response get_openapi_json(Service& service, const Request& request);
+// assets.cpp
+Response get_asset(Service& service, const Request& request);
+// clouds.cpp
+Response list_clouds(Service& service, const Request& request);
+Response upload_cloud(Service& service, const Request& request);
+Response get_cloud(Service& service, const Request& request);
+Response get_cloud_data(Service& service, const Request& request);
+Response delete_cloud(Service& service, const Request& request);
+// sessions.cpp
+Response list_sessions(Service& service, const Request& request);
+Response create_session(Service& service, const Request& request);
+Response get_session(Service& service, const Request& request);
+Response delete_session(Service& service, const Request& request);
+// regions.cpp
+Response get_painting(Service& service, const Request& request);
+Response replace_painting(Service& service, const Request& request);
+Response clear_painting(Service& service, const Request& request);
+Response paint_region(Service& service, const Request& request);
+// preview.cpp
+Response put_preview(Service& service, const Request& request);
+Response post_preview(Service& service, const Request& request);
+Response delete_preview(Service& service, const Request& request);
+// edits.cpp
+Response list_edits(Service& service, const Request& request);
+Response post_edit(Service& service, const Request& request);
+Response put_head(Service& service, const Request& request);
+// samples.cpp
+Response get_samples(Service& service, const Request& request);
+// stream.cpp
+Response get_stream(Service& service, const Request& request);
+
+}  // namespace pointwright::server

@@ -1,0 +1,154 @@
+#include "server/handlers/query.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include "protocol/frames/frame.h"
+
+namespace pointwright::server {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+
+namespace {
+
+Problem bad_parameter(const std::string& name, std::string detail) {
+  return Problem{.kind = ProblemKind::kInvalidValue,
+                 .detail = "the query parameter " + name.substr(0, 64) + " is not acceptable: " + detail,
+                 .errors = {{.pointer = std::string(1, '?').append(name, 0, 64), .detail = detail}}};
+}
+
+/// The comma-separated entries of a header, without parameters and blanks; those with q=0 are left out.
+std::vector<std::string> listed(std::string_view header) {
+  std::vector<std::string> entries;
+  while (!header.empty()) {
+    const std::size_t end = std::min(header.find(','), header.size());
+    std::string entry(header.substr(0, end));
+    header.remove_prefix(std::min(end + 1, header.size()));
+    entry.erase(std::remove_if(entry.begin(), entry.end(), [](char c) { return c == ' ' || c == '\t'; }),
+                entry.end());
+    const std::size_t quality = entry.find(";q=0");
+    if (quality != std::string::npos && entry.find_first_not_of("0.", quality + 4) == std::string::npos)
+      continue;
+    entry.resize(std::min(entry.find(';'), entry.size()));
+    if (!entry.empty()) entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
+}  // namespace
+
+Outcome<Done> check_query(const RequestHead& head, const std::vector<std::string_view>& known) {
+  for (std::size_t i = 0; i < head.query.size(); ++i) {
+    const std::string& name = head.query[i].first;
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      return bad_parameter(name, "it is unknown here");
+    for (std::size_t j = 0; j < i; ++j)
+      if (head.query[j].first == name) return bad_parameter(name, "it is given more than once");
+  }
+  return Done{};
+}
+
+std::optional<std::string> query_value(const RequestHead& head, std::string_view name) {
+  for (const NameValue& entry : head.query)
+    if (entry.first == name) return entry.second;
+  return std::nullopt;
+}
+
+Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t allowed,
+                                        std::uint16_t fallback) {
+  constexpr std::array<std::pair<std::string_view, std::uint16_t>, 6> kNames = {
+      {{"normal", protocol::kFrameNormal},
+       {"t", protocol::kFrameT},
+       {"detail", protocol::kFrameDetail},
+       {"color", protocol::kFrameColor},
+       {"marks", protocol::kFrameMarks},
+       {"ids", protocol::kFrameIds}}};
+  const auto text = query_value(head, "attributes");
+  if (!text) return fallback;
+  std::uint16_t attributes = 0;
+  for (const std::string& entry : listed(*text)) {
+    const auto known =
+        std::find_if(kNames.begin(), kNames.end(), [&](const auto& n) { return n.first == entry; });
+    if (known == kNames.end() || (known->second & allowed) == 0)
+      return bad_parameter("attributes",
+                           "only normal, t, detail, color, marks" +
+                               std::string((allowed & protocol::kFrameIds) != 0 ? ", ids" : "") +
+                               " can be asked for");
+    attributes = static_cast<std::uint16_t>(attributes | known->second);
+  }
+  return attributes;
+}
+
+Outcome<std::optional<std::uint32_t>> query_number(const RequestHead& head, std::string_view name) {
+  const auto text = query_value(head, name);
+  if (!text) return std::optional<std::uint32_t>();
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
+  if (text->empty() || text->size() > 9 || error != std::errc{} || end != text->data() + text->size())
+    return bad_parameter(std::string(name), "a whole number is expected");
+  return std::optional<std::uint32_t>(value);
+}
+
+Outcome<Format> negotiated_format(const RequestHead& head, const std::vector<Format>& formats) {
+  if (const auto name = query_value(head, "format")) {
+    for (const Format& format : formats)
+      if (format.name == *name) return format;
+    std::string names;
+    for (const Format& format : formats) names += (names.empty() ? "" : ", ") + std::string(format.name);
+    return bad_parameter("format", "it must be one of " + names);
+  }
+  const auto accept = head.header("accept");
+  if (!accept) return formats.front();
+  for (const std::string& entry : listed(*accept)) {
+    if (entry == "*/*") return formats.front();
+    for (const Format& format : formats)
+      if (entry == format.media_type.substr(0, format.media_type.find(';'))) return format;
+  }
+  return Problem{.kind = ProblemKind::kNotAcceptable,
+                 .detail = "Accept names none of the formats that can be given"};
+}
+
+bool accepts(const RequestHead& head, std::string_view media_type) {
+  const auto entries = listed(head.header("accept").value_or(""));
+  return std::find(entries.begin(), entries.end(), media_type) != entries.end();
+}
+
+std::string etag_of(std::initializer_list<std::string_view> parts) {
+  std::string tag(1, '"');
+  for (const std::string_view part : parts) {
+    if (tag.size() > 1) tag.push_back('-');
+    tag.append(part);
+  }
+  tag.push_back('"');
+  return tag;
+}
+
+bool is_unchanged(const RequestHead& head, const std::string& etag) {
+  const auto header = head.header("if-none-match");
+  if (!header) return false;
+  for (std::string entry : listed(*header)) {
+    if (entry.rfind("W/", 0) == 0) entry.erase(0, 2);
+    if (entry == etag || entry == "*") return true;
+  }
+  return false;
+}
+
+Response not_modified(const std::string& etag) {
+  Response response{.status = 304};
+  return response.with_header("ETag", etag);
+}
+
+std::string download_name(const std::string& name, std::string_view extension) {
+  std::string plain;
+  for (const char c : name) {
+    const bool usual =
+        (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_';
+    plain.push_back(usual ? c : '-');
+  }
+  return "attachment; filename=\"" + (plain.empty() ? "cloud" : plain.substr(0, 80)) +
+         std::string(extension) + "\"";
+}
+
+}  // namespace pointwright::server

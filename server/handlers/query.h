@@ -1,0 +1,53 @@
+#pragma once
+// Checked reading of query parameters and negotiation headers: unknown and repeated ones are refused, like
+// members of a document.
+
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/outcome.h"
+#include "server/http/message.h"
+
+namespace pointwright::server {
+
+/// Every parameter is one of `known`, and given once. Problem: kInvalidValue.
+Outcome<Done> check_query(const RequestHead& head, const std::vector<std::string_view>& known);
+
+/// The parameter's text, where it was given.
+std::optional<std::string> query_value(const RequestHead& head, std::string_view name);
+
+/// ?attributes=normal,t,detail,color,marks,ids as the bits of a frame. `fallback` where it is not given.
+Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t allowed,
+                                        std::uint16_t fallback);
+
+/// A whole number of at most 9 digits; nullopt where it is not given.
+Outcome<std::optional<std::uint32_t>> query_number(const RequestHead& head, std::string_view name);
+
+/// A representation that can be given: what ?format= calls it, and its media type.
+struct Format {
+  std::string_view name;
+  std::string_view media_type;
+  std::string_view extension;
+};
+/// The format that ?format= names, or else the first that Accept lists, or else formats[0]. Problems:
+/// kInvalidValue, kNotAcceptable.
+Outcome<Format> negotiated_format(const RequestHead& head, const std::vector<Format>& formats);
+
+/// Whether Accept names the media type (q=0 counts as not).
+bool accepts(const RequestHead& head, std::string_view media_type);
+
+/// A strong entity tag of the parts, joined by dashes.
+std::string etag_of(std::initializer_list<std::string_view> parts);
+/// Whether If-None-Match lists the tag.
+bool is_unchanged(const RequestHead& head, const std::string& etag);
+/// 304 with the tag.
+Response not_modified(const std::string& etag);
+
+/// Content-Disposition for a download: the name with everything unusual replaced.
+std::string download_name(const std::string& name, std::string_view extension);
+
+}  // namespace pointwright::server

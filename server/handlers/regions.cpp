@@ -1,0 +1,57 @@
+#include "server/handlers/handlers.h"
+
+namespace pointwright::server {
+namespace {
+
+/// The region that the second capture names; the route lets only known names through.
+RegionKind region_of(const Request& request) {
+  return protocol::region_of_name(request.captures.at(1)).value();
+}
+
+}  // namespace
+
+Response get_painting(Service& service, const Request& request) {
+  const auto session = session_of(service, request);
+  if (!session.ok()) return problem_response(session.problem(), request);
+  const SharedDocument document = session.value()->document();
+  if (document->state != protocol::SessionState::kReady)
+    return problem_response({.kind = ProblemKind::kWrongState, .detail = "the session is not ready"},
+                            request);
+  const Painting& painting = document->painting(region_of(request));
+  return json_response(
+             protocol::painting_document(region_of(request), painting.samples, *painting.operations))
+      .with_header("ETag", revision_tag(document->revision));
+}
+
+Response replace_painting(Service& service, const Request& request) {
+  const auto session = session_of(service, request);
+  if (!session.ok()) return problem_response(session.problem(), request);
+  auto operations = parsed_body(service, request, protocol::parse_painting);
+  if (!operations.ok()) return problem_response(operations.problem(), request);
+  const auto painted = session.value()->replace_painting(region_of(request), std::move(operations.value()));
+  if (!painted.ok()) return problem_response(painted.problem(), request);
+  return session_response(*session.value(), *painted.value().document);
+}
+
+Response clear_painting(Service& service, const Request& request) {
+  const auto session = session_of(service, request);
+  if (!session.ok()) return problem_response(session.problem(), request);
+  const auto painted = session.value()->replace_painting(region_of(request), {});
+  if (!painted.ok()) return problem_response(painted.problem(), request);
+  return session_response(*session.value(), *painted.value().document);
+}
+
+Response paint_region(Service& service, const Request& request) {
+  const auto session = session_of(service, request);
+  if (!session.ok()) return problem_response(session.problem(), request);
+  const auto operation = parsed_body(service, request, protocol::parse_paint_operation);
+  if (!operation.ok()) return problem_response(operation.problem(), request);
+  const auto painted = session.value()->paint(region_of(request), operation.value());
+  if (!painted.ok()) return problem_response(painted.problem(), request);
+  const Document& document = *painted.value().document;
+  protocol::JsonDocument body = protocol::to_json(session.value()->describe(document));
+  body["changed"] = painted.value().changed;
+  return json_response(body).with_header("ETag", revision_tag(document.revision));
+}
+
+}  // namespace pointwright::server

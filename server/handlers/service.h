@@ -1,0 +1,81 @@
+#pragma once
+// What the handlers work on. Handlers are free functions: request in, response out, no HTTP library, no
+// sockets.
+
+#include <atomic>
+#include <functional>
+#include <string>
+
+#include "server/base/budget.h"
+#include "server/config/config.h"
+#include "server/http/message.h"
+#include "server/http/problem_response.h"
+#include "server/sessions/compute_pool.h"
+#include "server/store/assets.h"
+#include "server/store/cloud_store.h"
+#include "server/store/importer.h"
+#include "server/store/session_store.h"
+
+namespace pointwright::server {
+
+/// The parts of the daemon that a test may replace.
+struct ServiceParts {
+  Decoder decode;
+  HierarchyBuilder build;
+  AssetTable assets;
+};
+
+/// Everything that lives as long as the daemon does. Members are thread-safe.
+class Service {
+ public:
+  Service(Config config, ServiceParts parts);
+
+  const Config config;
+  const Decoder decode;
+  const AssetTable assets;
+  ComputePool background;   ///< what lasts for seconds: building, exporting
+  ComputePool interactive;  ///< what a hand waits for: painting, previews, edits
+  CloudStore clouds;
+  SessionStore sessions;
+  Budget upload_memory;
+  Budget streams;
+  std::atomic<bool> stopping{false};
+};
+
+using Handler = Response (*)(Service&, const Request&);
+
+/// 200 with a document.
+Response json_response(const protocol::JsonDocument& document, int status = 200);
+
+/// The session that the first capture names; a problem where there is none.
+Outcome<std::shared_ptr<Session>> session_of(Service& service, const Request& request);
+
+/// The session document with its ETag.
+Response session_response(const Session& session, const Document& document, int status = 200);
+std::string revision_tag(std::uint64_t revision);
+
+/// Runs heavy work on the pool and waits: HTTP threads do not compute.
+template <typename Work>
+auto computed(ComputePool& pool, Work work) -> Outcome<decltype(work())> {
+  try {
+    return pool.submit(std::move(work)).get();
+  } catch (const std::future_error&) {
+    return Problem{.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"};
+  }
+}
+
+/// Parses the body with one of the protocol's parsers, within the limits.
+template <typename T>
+Outcome<T> parsed_body(const Service& service, const Request& request,
+                       protocol::Parsed<T> (*parse)(const protocol::Json&)) {
+  if (request.body.empty())
+    return Problem{.kind = ProblemKind::kEmptyBody, .detail = "this request needs a JSON body"};
+  const protocol::ParseLimits limits{
+      .max_bytes = static_cast<std::size_t>(service.config.limits.max_json_bytes),
+      .max_depth = static_cast<std::size_t>(service.config.limits.max_json_depth)};
+  auto parsed = protocol::parse_body(request.body, limits, parse);
+  if (!parsed) return protocol::to_problem(parsed.errors());
+  return std::move(parsed).value();
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,148 @@
+#include "server/main/daemon.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <exception>
+#include <iostream>
+#include <thread>
+
+#include "engine/multires/hierarchy.h"
+#include "server/handlers/service.h"
+#include "server/http/http_server.h"
+#include "server/ingest/files.h"
+#include "server/log/log.h"
+#include "server/routes/routes.h"
+
+namespace pointwright::server {
+namespace {
+
+HttpOptions http_options(const Config& config) {
+  const Limits& limits = config.limits;
+  const auto ms = [](std::uint64_t value) { return std::chrono::milliseconds(value); };
+  return {.host = config.host,
+          .port = config.port,
+          .allowed_hosts = config.allowed_hosts,
+          .head = {.max_bytes = static_cast<std::size_t>(limits.max_head_bytes),
+                   .max_headers = static_cast<std::size_t>(limits.max_headers),
+                   .max_path_bytes = static_cast<std::size_t>(limits.max_path_bytes)},
+          .head_deadline = ms(limits.head_deadline_ms),
+          .body_grace = ms(limits.body_grace_ms),
+          .least_body_rate = limits.least_body_rate,
+          .stream_write_deadline = ms(limits.stream_write_deadline_ms),
+          .max_connections = static_cast<std::size_t>(limits.max_connections)};
+}
+
+/// Connections need descriptors; the usual soft limit of 1024 is below what we are configured to serve.
+void raise_descriptor_limit(const Config& config, Log& log) {
+  rlimit limit{};
+  ::getrlimit(RLIMIT_NOFILE, &limit);
+  const rlim_t wanted = config.limits.max_connections + 128;
+  if (limit.rlim_cur >= wanted) return;
+  limit.rlim_cur = std::min<rlim_t>(wanted, limit.rlim_max);
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+  if (limit.rlim_cur < wanted)
+    log.write(LogLevel::kWarn, "descriptor-limit",
+              {{"message", "max_connections needs more descriptors than the system grants"},
+               {"granted", limit.rlim_cur},
+               {"wanted", wanted}});
+}
+
+/// Loads the clouds of --sample. A sentence where one cannot be loaded.
+std::optional<std::string> load_samples(Service& service, Log& log) {
+  for (const SampleFile& sample : service.config.samples) {
+    const auto bytes = read_file(sample.path, service.config.limits.max_upload_bytes);
+    if (!bytes) return bytes.error().message;
+    const auto cloud = import_cloud(service.clouds, service.decode, service.config.limits, bytes.value(),
+                                    {.name = sample.name, .media_type = "", .drop_non_finite = false});
+    if (!cloud.ok()) return sample.path + ": " + cloud.problem().detail;
+    log.write(LogLevel::kInfo, "sample-loaded",
+              {{"cloud", cloud.value()->document.id},
+               {"name", sample.name},
+               {"samples", cloud.value()->document.report.sample_count}});
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> write_port_file(const std::string& path, std::uint16_t port) {
+  if (path.empty()) return std::nullopt;
+  const std::string text = std::to_string(port) + "\n";
+  const auto written = write_file_atomically(path, std::as_bytes(std::span(text.data(), text.size())));
+  return written ? std::nullopt : std::optional<std::string>(written.error().message);
+}
+
+}  // namespace
+
+int run_daemon(const Config& config) {
+  std::signal(SIGPIPE, SIG_IGN);
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGTERM, SIGINT, SIGUSR1}) sigaddset(&signals, signal);
+  ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before any thread is made: all inherit it
+
+  const auto fail = [](const std::string& message) {
+    std::cerr << "pointwrightd: " << message << "\n";
+    return 1;
+  };
+  try {
+    Log log(config.log_level, config.log_file);
+    raise_descriptor_limit(config, log);
+    Service service(config,
+                    {.decode = confined_decoder(config.limits),
+                     .build = build_hierarchy,
+                     .assets = config.web_root.empty() ? AssetTable() : AssetTable::load(config.web_root)});
+    if (auto problem = load_samples(service, log)) return fail(*problem);
+    HttpServer server(
+        http_options(config),
+        [&service](const RequestHead& head, const std::string& id) { return resolve(service, head, id); },
+        [&log](const RequestLog& request) { log.request(request); });
+    if (auto problem = server.start()) return fail(*problem);
+    std::atomic<bool> ended_by_itself{false};
+    std::thread listener([&] {
+      if (server.run()) return;
+      ended_by_itself = true;
+      ::kill(::getpid(), SIGUSR1);  // wakes the wait below
+    });
+    if (auto problem = write_port_file(config.port_file, server.port())) {
+      server.stop(std::chrono::milliseconds(0));
+      listener.join();
+      return fail(*problem);
+    }
+    log.write(LogLevel::kInfo, "started",
+              {{"version", POINTWRIGHT_VERSION},
+               {"host", config.host},
+               {"port", server.port()},
+               {"pid", ::getpid()}});
+    std::cout << "pointwrightd listens on http://" << config.host << ":" << server.port() << "/" << std::endl;
+
+    int signal = 0;
+    ::sigwait(&signals, &signal);
+    // From here on a further signal ends the process as it always would.
+    for (const int each : {SIGTERM, SIGINT}) std::signal(each, SIG_DFL);
+    ::pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+    log.write(LogLevel::kInfo, "stopping", {{"signal", signal}, {"requests", server.active_connections()}});
+    service.stopping = true;
+    const bool drained = server.stop(std::chrono::milliseconds(config.limits.shutdown_deadline_ms));
+    service.sessions.close_all("the server is stopping");
+    if (!drained) {
+      log.write(LogLevel::kWarn, "stopped", {{"message", "some requests did not end in time"}});
+    } else {
+      log.write(LogLevel::kInfo, "stopped", {{"message", "all requests ended"}});
+    }
+    if (!drained) {
+      // A connection thread that does not return cannot be joined; nothing of it is worth waiting for any
+      // longer.
+      log.flush();
+      std::_Exit(ended_by_itself ? 1 : 0);
+    }
+    listener.join();
+    if (ended_by_itself) return fail("listening ended by itself");
+    return 0;
+  } catch (const std::exception& error) {
+    return fail(error.what());
+  }
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,32 @@
+#include <cstdlib>
+#include <cstring>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "server/config/config.h"
+#include "server/ingest/confined.h"
+#include "server/main/daemon.h"
+
+extern char** environ;
+
+int main(int argc, char** argv) {
+  using namespace pointwright;
+  if (argc > 1 && std::strcmp(argv[1], kDecodeChildArgument) == 0) return decode_child_main();
+  server::EnvironmentNames names;
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    const std::string text = *entry;
+    if (text.rfind("POINTWRIGHT_", 0) == 0) names.push_back(text.substr(0, text.find('=')));
+  }
+  const server::Environment environment = [](const std::string& name) -> std::optional<std::string> {
+    const char* const value = std::getenv(name.c_str());
+    return value == nullptr ? std::nullopt : std::optional<std::string>(value);
+  };
+  const auto outcome =
+      server::read_config(std::vector<std::string>(argv + 1, argv + argc), environment, names);
+  if (const auto* exit = std::get_if<server::ConfigExit>(&outcome)) {
+    (exit->status == 0 ? std::cout : std::cerr) << exit->text;
+    return exit->status;
+  }
+  return server::run_daemon(std::get<server::Config>(outcome));
+}

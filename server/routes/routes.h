@@ -1,0 +1,30 @@
+#pragma once
+// The one table of routes, and how a request finds its row.
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "server/handlers/service.h"
+
+namespace pointwright::server {
+
+/// One row. Patterns are plain text with the placeholders {id} (22 characters of base64url), {region} (zero
+/// or one) and {slug} (lower-case letters, digits and dashes).
+struct Route {
+  Method method;
+  std::string_view pattern;
+  BodyPolicy::Kind body;
+  Handler handler;
+};
+
+std::span<const Route> all_routes();
+
+/// Whether the path fits the pattern; what the placeholders matched goes to `captures`.
+bool matches(std::string_view pattern, std::string_view path, std::vector<std::string>& captures);
+
+/// Finds the row of a request: 404, 405 with Allow, 204 for OPTIONS, or the endpoint. HEAD is answered by
+/// GET's row. Uploads that could not be stored anyway are refused here, before their body is read.
+Resolution resolve(Service& service, const RequestHead& head, const std::string& request_id);
+
+}  // namespace pointwright::server

@@ -1,0 +1,30 @@
+#pragma once
+// From uploaded bytes to a stored cloud.
+
+#include <functional>
+#include <span>
+#include <string>
+
+#include "engine/io/cloud_io.h"
+#include "server/store/cloud_store.h"
+
+namespace pointwright::server {
+
+/// Decodes foreign bytes: in a confined process in the daemon, in this one in tests.
+using Decoder =
+    std::function<Result<ImportedCloud>(std::span<const std::byte>, CloudFormat, const ImportParams&)>;
+
+/// The confined decoder, with at most limits.max_decoders at once.
+Decoder confined_decoder(const Limits& limits);
+
+struct ImportRequest {
+  std::string name;
+  std::string media_type;  ///< says the format; application/octet-stream or empty: found by looking
+  bool drop_non_finite = false;
+};
+
+/// Problems: empty body, everything that decoding refuses, too many clouds, out of space, overloaded.
+Outcome<SharedCloud> import_cloud(CloudStore& store, const Decoder& decode, const Limits& limits,
+                                  std::span<const std::byte> bytes, const ImportRequest& request);
+
+}  // namespace pointwright::server

@@ -1,0 +1,98 @@
+#include "server/store/session_store.h"
+
+#include <algorithm>
+
+#include "server/base/random_id.h"
+
+namespace pointwright::server {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+
+namespace {
+
+/// Bytes a sample of a session: the hierarchy while it is built, then the rest, the committed, the previewed
+/// and the shown surface with their fields and frames.
+constexpr std::uint64_t kBytesPerSample = 400;
+/// Stored history states that a session may need at most before it thins them out, in bytes a sample.
+constexpr std::uint64_t kHistoryBytesPerSample = 32 * 52;
+
+}  // namespace
+
+SessionStore::SessionStore(const Limits& limits, SessionServices services)
+    : limits_(limits), services_(std::move(services)), memory_(limits.max_session_bytes) {}
+
+SessionStore::~SessionStore() {
+  close_all("the server is stopping");
+}
+
+Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
+                                                       const protocol::CreateSessionRequest& request) {
+  Entry entry;
+  entry.cloud_use = clouds.use(request.cloud);
+  const SharedCloud cloud = entry.cloud_use == nullptr ? nullptr : clouds.find(request.cloud);
+  if (cloud == nullptr)
+    return Problem{.kind = ProblemKind::kNotFound,
+                   .detail = "there is no cloud with that id",
+                   .errors = {{.pointer = "/cloud", .detail = "no such cloud"}}};
+  const std::uint64_t samples = cloud->cloud->size();
+  const std::uint64_t history = std::min(limits_.history_bytes, samples * kHistoryBytesPerSample);
+  const std::lock_guard lock(mutex_);
+  if (entries_.size() >= limits_.max_sessions)
+    return Problem{.kind = ProblemKind::kTooMany,
+                   .detail = "the server holds as many sessions as it may",
+                   .limit = static_cast<double>(limits_.max_sessions),
+                   .actual = static_cast<double>(entries_.size())};
+  entry.memory = memory_.hold(samples * kBytesPerSample + history);
+  if (entry.memory == nullptr)
+    return Problem{.kind = ProblemKind::kOutOfSpace,
+                   .detail = "the memory for sessions is used up",
+                   .limit = static_cast<double>(memory_.total()),
+                   .actual = static_cast<double>(memory_.held() + samples * kBytesPerSample + history)};
+  entry.session = Session::create({.id = random_id(),
+                                   .name = request.name.empty() ? cloud->document.name : request.name,
+                                   .cloud_id = request.cloud,
+                                   .cloud = cloud->cloud,
+                                   .hierarchy = request.params,
+                                   .history_bytes = history,
+                                   .max_edits = static_cast<std::size_t>(limits_.max_edits),
+                                   .max_operations = static_cast<std::size_t>(limits_.max_operations)},
+                                  services_);
+  entries_.push_back(entry);
+  return entry.session;
+}
+
+std::shared_ptr<Session> SessionStore::find(const std::string& id) const {
+  const std::lock_guard lock(mutex_);
+  const auto it =
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.session->id() == id; });
+  return it == entries_.end() ? nullptr : it->session;
+}
+
+std::vector<std::shared_ptr<Session>> SessionStore::list() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<Session>> sessions;
+  for (const Entry& entry : entries_) sessions.push_back(entry.session);
+  return sessions;
+}
+
+Outcome<Done> SessionStore::remove(const std::string& id) {
+  Entry removed;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto it =
+        std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.session->id() == id; });
+    if (it == entries_.end())
+      return Problem{.kind = ProblemKind::kNotFound, .detail = "there is no such session"};
+    removed = std::move(*it);
+    entries_.erase(it);
+  }
+  removed.session->close("the session was deleted");
+  return Done{};
+}
+
+void SessionStore::close_all(const std::string& reason) {
+  for (const auto& session : list()) session->close(reason);
+}
+
+}  // namespace pointwright::server

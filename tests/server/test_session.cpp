@@ -1,0 +1,425 @@
+#include "server/sessions/session.h"
+
+#include <doctest/doctest.h>
+
+#include <thread>
+
+#include "engine/core/parallel.h"
+#include "protocol/frames/frame.h"
+#include "synthetic.h"
+
+using namespace pointwright;
+using namespace pointwright::server;
+using namespace pointwright::test;
+using protocol::ProblemKind;
+
+namespace {
+
+template <typename Condition>
+bool comes_true(Condition condition) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+/// Pools, and sessions on a small sheet.
+struct Workshop {
+  ComputePool background{1, 0};
+  ComputePool interactive{2, 0};
+  std::shared_ptr<const Cloud> cloud = std::make_shared<const Cloud>(wavy_sheet(40));
+
+  std::shared_ptr<Session> open(std::uint64_t history_bytes = 1ULL << 30U,
+                                HierarchyBuilder build = build_hierarchy) {
+    return Session::create({.id = "AAAAAAAAAAAAAAAAAAAAAA",
+                            .name = "sheet",
+                            .cloud_id = "BBBBBBBBBBBBBBBBBBBBBB",
+                            .cloud = cloud,
+                            .hierarchy = {.scales = {0.05F}},
+                            .history_bytes = history_bytes,
+                            .max_edits = 50,
+                            .max_operations = 5},
+                           {.interactive = interactive, .background = background, .build = std::move(build)});
+  }
+  std::shared_ptr<Session> ready(std::uint64_t history_bytes = 1ULL << 30U) {
+    auto session = open(history_bytes);
+    REQUIRE(comes_true([&] { return session->document()->state != protocol::SessionState::kBuilding; }));
+    REQUIRE(session->document()->state == protocol::SessionState::kReady);
+    return session;
+  }
+  std::shared_ptr<Session> painted(std::uint64_t history_bytes = 1ULL << 30U) {
+    auto session = ready(history_bytes);
+    REQUIRE(session->paint(RegionKind::kZero, left_of(0.2)).ok());
+    REQUIRE(session->paint(RegionKind::kOne, right_of(0.8)).ok());
+    return session;
+  }
+};
+
+std::shared_ptr<const RecordedEdit> commit(Session& session, const EditParams& params) {
+  const auto committed = session.commit(params, session.document()->revision);
+  REQUIRE(committed.ok());
+  return committed.value().record;
+}
+
+const Level& finest(const Session& session) {
+  return session.document()->surface.surface->finest();
+}
+
+ProblemKind kind_of(const auto& outcome) {
+  REQUIRE_FALSE(outcome.ok());
+  return outcome.problem().kind;
+}
+
+}  // namespace
+
+TEST_CASE("a session builds, says how far it is, and becomes ready") {
+  Workshop workshop;
+  const auto session = workshop.ready();
+  const auto document = session->describe(*session->document());
+  CHECK(document.summary.revision == 0);
+  CHECK(document.summary.sample_count == 1600);
+  CHECK(document.progress.fraction == doctest::Approx(1.0));
+  CHECK(document.spacing == doctest::Approx(1.0 / 39).epsilon(0.3));
+  REQUIRE(document.level_scales.size() == 2);
+  CHECK(document.level_scales[0] > 0.0);
+  CHECK(document.level_scales[1] == 0.0);
+  CHECK(document.decomposition.size() == 1);
+  CHECK(finest(*session).position == workshop.cloud->position);
+}
+
+TEST_CASE("while it builds, and after it failed, a session refuses changes with the reason") {
+  Workshop workshop;
+  std::atomic<bool> go{false};
+  const auto failing = workshop.open(
+      1, [&](const Cloud&, const HierarchyParams&, const ExecutionContext&) -> Result<Hierarchy> {
+        while (!go) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        return Error{.code = ErrorCode::kInvalidArgument, .message = "no such scale", .field = "scales"};
+      });
+  CHECK(kind_of(failing->paint(RegionKind::kZero, left_of(0.2))) == ProblemKind::kWrongState);
+  CHECK(kind_of(failing->put_preview({.edit = lift(1), .sequence = 1})) == ProblemKind::kWrongState);
+  go = true;
+  REQUIRE(comes_true([&] { return failing->document()->state == protocol::SessionState::kFailed; }));
+  CHECK(failing->document()->error->detail == "no such scale");
+  CHECK(kind_of(failing->commit(lift(1), 0)) == ProblemKind::kWrongState);
+}
+
+TEST_CASE("closing a session cancels its building") {
+  Workshop workshop;
+  std::atomic<bool> cancelled{false};
+  const auto session = workshop.open(
+      1, [&](const Cloud&, const HierarchyParams&, const ExecutionContext& context) -> Result<Hierarchy> {
+        while (!context.is_cancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        cancelled = true;
+        return cancelled_error();
+      });
+  session->close("the session was deleted");
+  CHECK(comes_true([&] { return cancelled.load(); }));
+  CHECK(session->closed_reason().value() == "the session was deleted");
+  CHECK(kind_of(session->paint(RegionKind::kZero, left_of(0.2))) == ProblemKind::kNotFound);
+}
+
+TEST_CASE("painting counts what changed and raises the revision") {
+  Workshop workshop;
+  const auto session = workshop.ready();
+  const auto first = session->paint(RegionKind::kZero, left_of(0.2));
+  REQUIRE(first.ok());
+  CHECK(first.value().changed == first.value().document->zero.samples);
+  CHECK(first.value().changed == 8 * 40);
+  CHECK(first.value().document->revision == 1);
+  const auto again = session->paint(RegionKind::kZero, left_of(0.2));
+  CHECK(again.value().changed == 0);
+  CHECK(again.value().document->zero.operations->size() == 2);
+
+  const auto replaced = session->replace_painting(RegionKind::kZero, {left_of(0.1)});
+  REQUIRE(replaced.ok());
+  CHECK(replaced.value().document->zero.samples == 4 * 40);
+  CHECK(replaced.value().document->zero.operations->size() == 1);
+  const auto cleared = session->replace_painting(RegionKind::kZero, {});
+  CHECK(cleared.value().document->zero.samples == 0);
+  CHECK(cleared.value().document->revision == 4);
+}
+
+TEST_CASE("a region takes no more operations than the limit says") {
+  Workshop workshop;
+  const auto session = workshop.ready();
+  for (int i = 0; i < 5; ++i) CHECK(session->paint(RegionKind::kOne, right_of(0.8)).ok());
+  CHECK(kind_of(session->paint(RegionKind::kOne, right_of(0.8))) == ProblemKind::kTooMany);
+  CHECK(session->document()->one.operations->size() == 5);
+}
+
+TEST_CASE("edits need both regions, apart from each other") {
+  Workshop workshop;
+  const auto session = workshop.ready();
+  CHECK(kind_of(session->put_preview({.edit = lift(1), .sequence = 1})) == ProblemKind::kEmptyRegion);
+  REQUIRE(session->paint(RegionKind::kZero, left_of(0.5)).ok());
+  CHECK(kind_of(session->commit(lift(1), 1)) == ProblemKind::kEmptyRegion);
+  REQUIRE(session->paint(RegionKind::kOne, right_of(0.4)).ok());
+  CHECK(kind_of(session->put_preview({.edit = lift(1), .sequence = 1})) == ProblemKind::kRegionsIntersect);
+  CHECK(kind_of(session->render_preview({.edit = lift(1), .sequence = 1}, 0)) ==
+        ProblemKind::kRegionsIntersect);
+  CHECK(session->document()->edits->empty());
+}
+
+TEST_CASE("an edit moves the one-region, leaves the zero-region to the bit and is recorded") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  const std::uint64_t before = session->document()->revision;
+  const auto record = commit(*session, lift(0.5));
+  CHECK(session->document()->revision == before + 1);
+  CHECK(session->document()->head == 1);
+  CHECK(record->index == 1);
+  CHECK(record->zero_samples == 320);
+  CHECK(record->one_samples == 320);
+  CHECK(record->moved_samples >= 320);
+  const Level& now = finest(*session);
+  std::size_t checked = 0;
+  for (std::size_t i = 0; i < now.position.size(); ++i) {
+    const Vec3f rest = workshop.cloud->position[i];
+    if (rest.x() <= 0.2F) {
+      CHECK(now.position[i] == rest);
+      ++checked;
+    } else if (rest.x() >= 0.8F) {
+      CHECK(now.position[i].z() == doctest::Approx(rest.z() + 0.5F).epsilon(0.01));
+      ++checked;
+    }
+  }
+  CHECK(checked == 640);
+}
+
+TEST_CASE("an edit for a stale revision is refused with the current one") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  const auto stale = session->commit(lift(0.5), 1);
+  CHECK(kind_of(stale) == ProblemKind::kStaleRevision);
+  CHECK(stale.problem().revision.value() == 2);
+  CHECK(session->document()->head == 0);
+}
+
+TEST_CASE("levels that do not exist are refused") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  CHECK(kind_of(session->put_preview({.edit = lift(0.5, 2), .sequence = 1})) == ProblemKind::kInvalidValue);
+  CHECK(kind_of(session->commit(lift(0.5, 2), 2)) == ProblemKind::kInvalidValue);
+}
+
+TEST_CASE("undo, redo and jumps bring every state back to the bit, stored or replayed") {
+  Workshop workshop;
+  // A budget of nothing: every state but the first and the current one must be replayed.
+  for (const std::uint64_t budget : {1ULL << 30U, 1ULL}) {
+    const auto session = workshop.painted(budget);
+    std::vector<Level> states = {finest(*session)};
+    for (const EditParams& params : {lift(0.3), turn(0.7), lift(0.1, 1), turn(-0.4), lift(-0.2)}) {
+      commit(*session, params);
+      states.push_back(finest(*session));
+    }
+    for (const std::size_t edit : {4U, 3U, 5U, 0U, 2U, 5U, 1U, 4U}) {
+      const std::uint64_t before = session->document()->revision;
+      REQUIRE(session->move_head(edit).ok());
+      CHECK(session->document()->head == edit);
+      CHECK(session->document()->revision == before + 1);
+      CHECK(finest(*session) == states[edit]);
+    }
+    CHECK(session->document()->edits->size() == 5);
+    CHECK(kind_of(session->move_head(6)) == ProblemKind::kInvalidValue);
+    const std::uint64_t revision = session->document()->revision;
+    REQUIRE(session->move_head(4).ok());  // where it already is
+    CHECK(session->document()->revision == revision);
+  }
+}
+
+TEST_CASE("an edit after undo drops what was undone") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  commit(*session, lift(0.3));
+  commit(*session, lift(0.4));
+  REQUIRE(session->move_head(1).ok());
+  CHECK(commit(*session, turn(0.2))->index == 2);
+  CHECK(session->document()->edits->size() == 2);
+  CHECK(kind_of(session->move_head(3)) == ProblemKind::kInvalidValue);
+}
+
+TEST_CASE("undo of an edit leaves the painting alone, and painting leaves the edits alone") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  commit(*session, lift(0.3));
+  const Level lifted = finest(*session);
+  REQUIRE(session->replace_painting(RegionKind::kZero, {left_of(0.1)}).ok());
+  CHECK(finest(*session) == lifted);
+  REQUIRE(session->move_head(0).ok());
+  CHECK(session->document()->zero.samples == 160);
+  REQUIRE(session->move_head(1).ok());  // replays nothing with the new painting
+  CHECK(finest(*session) == lifted);
+}
+
+TEST_CASE("the same edits give the same bits with one thread and with many") {
+  std::vector<Level> results;
+  for (const int threads : {1, 4}) {
+    Workshop workshop;
+    with_threads(threads, [&] {
+      const auto session = workshop.painted();
+      commit(*session, turn(0.7));
+      commit(*session, lift(0.2, 1));
+      commit(*session, lift(0.1));
+      results.push_back(finest(*session));
+    });
+  }
+  CHECK(results[0] == results[1]);
+}
+
+TEST_CASE("a level-0 edit after a single-resolution edit works on levels derived from the edited surface") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  commit(*session, lift(0.4, 1));
+  CHECK(session->document()->surface.first_valid_level == 1);
+  const Level before = finest(*session);
+  const auto base = session->committed_picture(0, false);
+  REQUIRE(base.ok());
+  CHECK(session->document()->surface.first_valid_level == 0);
+  CHECK(finest(*session) == before);
+  float highest = 0.0F;
+  for (std::size_t i = 0; i < 1600; ++i)
+    highest = std::max(highest, base.value().surface->levels[0].position[i].z());
+  CHECK(highest > 0.3F);
+  commit(*session, lift(0.4));
+  CHECK(finest(*session).position != before.position);
+}
+
+TEST_CASE("the newest preview wins and is shown with its number") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  const std::uint64_t revision = session->document()->revision;
+  for (std::uint64_t sequence = 1; sequence <= 40; ++sequence)
+    REQUIRE(session->put_preview({.edit = lift(0.01 * static_cast<double>(sequence)), .sequence = sequence})
+                .ok());
+  REQUIRE(comes_true([&] { return session->display().picture().sequence == 40; }));
+  CHECK(session->display().version() < 45);
+  CHECK(session->document()->revision == revision);
+  CHECK(finest(*session).position == workshop.cloud->position);
+  const Picture shown = session->display().picture();
+  CHECK(shown.revision == revision);
+  for (std::size_t i = 0; i < 1600; ++i)
+    if (workshop.cloud->position[i].x() >= 0.8F)
+      CHECK(shown.surface->finest().position[i].z() - workshop.cloud->position[i].z() ==
+            doctest::Approx(0.4F).epsilon(0.01));
+}
+
+TEST_CASE("a preview that was overtaken by a later one of the same drag is not shown") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  REQUIRE(session->put_preview({.edit = lift(0.2), .sequence = 8}).ok());
+  REQUIRE(session->put_preview({.edit = lift(0.1), .sequence = 7}).ok());
+  REQUIRE(comes_true([&] { return session->display().picture().sequence != 0; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  CHECK(session->display().picture().sequence == 8);
+}
+
+TEST_CASE("ending a preview shows the committed state again") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  REQUIRE(session->put_preview({.edit = lift(0.2), .sequence = 1}).ok());
+  REQUIRE(comes_true([&] { return session->display().picture().sequence == 1; }));
+  REQUIRE(session->end_preview().ok());
+  CHECK(session->display().picture().sequence == 0);
+  CHECK(session->display().picture().surface == session->document()->surface.surface);
+}
+
+TEST_CASE("what is committed after a preview is what the preview showed, to the bit") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  REQUIRE(session->put_preview({.edit = turn(0.6), .sequence = 1}).ok());
+  REQUIRE(comes_true([&] { return session->display().picture().sequence == 1; }));
+  const Level previewed = session->display().picture().surface->finest();
+  commit(*session, turn(0.6));
+  CHECK(finest(*session) == previewed);
+  const auto other = workshop.painted();
+  commit(*other, turn(0.6));
+  CHECK(finest(*other) == previewed);
+}
+
+TEST_CASE("a rendered preview is one whole frame that nobody else sees") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  const std::uint64_t version = session->display().version();
+  const auto frame =
+      session->render_preview({.edit = lift(0.3), .sequence = 5}, protocol::kAllFrameAttributes);
+  REQUIRE(frame.ok());
+  const auto decoded = protocol::decode_frame(*frame.value());
+  REQUIRE(decoded.ok());
+  CHECK(decoded.value().header.kind == protocol::FrameKind::kKey);
+  CHECK(decoded.value().header.sequence == 5);
+  CHECK(decoded.value().header.sample_count == 1600);
+  CHECK(session->display().picture().sequence == 0);
+  CHECK(session->display().version() <= version + 1);  // t may have arrived meanwhile
+}
+
+TEST_CASE("frames bring a viewer from any picture to the newest one") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  const std::uint16_t attributes = protocol::kFrameNormal | protocol::kFrameT | protocol::kFrameMarks;
+  REQUIRE(session->committed_picture(1, true).ok());
+  REQUIRE(comes_true([&] { return session->display().picture().field != nullptr; }));
+
+  std::map<std::uint32_t, std::vector<std::array<std::uint16_t, 4>>> blocks;
+  std::uint64_t seen = 0;
+  const auto update = [&] {
+    const auto frame = session->display().frame_since(seen, attributes);
+    const auto decoded = protocol::decode_frame(*frame.bytes);
+    REQUIRE(decoded.ok());
+    CHECK((decoded.value().header.kind == protocol::FrameKind::kKey) == (seen == 0));
+    for (const auto& block : decoded.value().blocks) blocks[block.number] = block.position_t;
+    seen = frame.version;
+    return decoded.value().header;
+  };
+  update();
+  REQUIRE(session->put_preview({.edit = lift(0.3), .sequence = 3}).ok());
+  REQUIRE(comes_true([&] { return session->display().picture().sequence == 3; }));
+  CHECK(update().sequence == 3);
+  commit(*session, lift(0.3));
+  REQUIRE(session->move_head(0).ok());
+  commit(*session, turn(0.3));
+  CHECK(update().revision == session->document()->revision);
+
+  // Deltas on top of deltas hold what a key frame holds.
+  seen = 0;
+  const auto by_deltas = blocks;
+  blocks.clear();
+  update();
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  CHECK(blocks.size() == by_deltas.size());
+}
+
+TEST_CASE("viewers that want the same frame share its bytes") {
+  Workshop workshop;
+  const auto session = workshop.ready();
+  const auto first = session->display().frame_since(0, protocol::kFrameNormal);
+  const auto second = session->display().frame_since(0, protocol::kFrameNormal);
+  CHECK(first.bytes == second.bytes);
+  CHECK(session->display().frame_since(0, 0).bytes != first.bytes);
+}
+
+TEST_CASE("the edited cloud keeps every attribute and the bits of what no edit moved") {
+  Workshop workshop;
+  auto cloud = std::make_shared<Cloud>(*workshop.cloud);
+  cloud->exact_position.resize(1600);
+  for (std::size_t i = 0; i < 1600; ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      cloud->exact_position[i][static_cast<std::size_t>(axis)] =
+          static_cast<double>(cloud->position[i][axis]) + 1e-12;
+  cloud->position_is_double = true;
+  workshop.cloud = cloud;
+  const auto session = workshop.painted();
+  commit(*session, lift(0.5));
+  const auto edited = session->edited_cloud(1);
+  REQUIRE(edited.ok());
+  const Cloud& now = *edited.value().cloud;
+  CHECK(now.color == cloud->color);
+  CHECK(now.id == cloud->id);
+  CHECK(now.has_normals());
+  for (std::size_t i = 0; i < 1600; ++i) {
+    if (cloud->position[i].x() <= 0.2F) CHECK(now.exact_position[i] == cloud->exact_position[i]);
+    if (cloud->position[i].x() >= 0.8F)
+      CHECK(now.exact_position[i][2] == doctest::Approx(cloud->exact_position[i][2] + 0.5).epsilon(0.01));
+  }
+}
