@@ -3,17 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <numeric>
 
 #include "engine/core/parallel.h"
+#include "protocol/frames/block_writer.h"
 #include "protocol/frames/frame.h"
-#include "protocol/frames/quantise.h"
 
 namespace pointwright::protocol {
 namespace {
 
-/// Blocks that one thread takes at a time.
-constexpr std::size_t kBlocksPerTask = 2;
+/// Pieces that one thread takes at a time: four windows of the cloud.
+constexpr std::size_t kPiecesPerTask = std::size_t{4} * kLayerCount;
 
 constexpr std::size_t padded_to_word(std::size_t bytes) {
   return (bytes + 3) / 4 * 4;
@@ -41,136 +40,6 @@ void check_columns(const FrameLayout& layout, const FrameColumns& columns, std::
                     "marks do not fit the layout");
   POINTWRIGHT_CHECK(!has(attributes, kFrameIds) || columns.ids.size() >= n, "ids do not fit the layout");
 }
-
-/// Buffers of one thread's blocks; a whole block of positions, chunks of everything else.
-struct Scratch {
-  explicit Scratch(std::size_t block_size) {
-    for (auto& axis : position) axis.resize(padded_to_block(block_size));
-  }
-  std::array<std::vector<float>, 3> position;
-  std::array<std::array<float, kQuantiseChunk>, 3> chunk;
-  std::array<std::uint32_t, 2 * kQuantiseChunk> words;
-};
-
-constexpr std::array<float, kQuantiseChunk> kZeros{};
-
-/// Calls write(first, count) for the chunks of `count` lanes.
-template <typename Write>
-void for_chunks(std::size_t count, const Write& write) {
-  for (std::size_t first = 0; first < count; first += kQuantiseChunk) {
-    write(first, std::min(kQuantiseChunk, count - first));
-  }
-}
-
-std::byte* copy_words(const std::uint32_t* words, std::size_t count, std::byte* out) {
-  std::memcpy(out, words, count * sizeof(std::uint32_t));
-  return out + count * sizeof(std::uint32_t);
-}
-
-/// One block's record, written to its place.
-class BlockEncoder {
- public:
-  BlockEncoder(const FrameLayout& layout, const FrameColumns& columns, const FrameState& state,
-               std::uint16_t attributes)
-      : layout_(layout),
-        columns_(columns),
-        state_(state),
-        attributes_(attributes),
-        scratch_(layout.block_size()) {}
-
-  /// Writes block_record_bytes() bytes; returns the box of the block.
-  Box3f encode(std::uint32_t block, std::byte* out) {
-    samples_ = layout_.block_samples(block);
-    QuantiseAxis axes[3];
-    const Box3f box = gather_positions(axes);
-    store(out, block);
-    store(out + 4, samples_.count);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      store(out + 8 + 4 * axis, axes[axis].minimum);
-      store(out + 20 + 4 * axis, axes[axis].extent);
-    }
-    out = write_positions(axes, out + kBlockHeaderBytes);
-    if (has(attributes_, kFrameNormal)) out = write_normals(out);
-    if (has(attributes_, kFrameDetail)) out = write_detail(out);
-    if (has(attributes_, kFrameColor)) out = write_column(columns_.color, out);
-    if (has(attributes_, kFrameMarks)) out = write_column(columns_.marks, out);
-    if (has(attributes_, kFrameIds)) write_column(columns_.ids, out);
-    return box;
-  }
-
- private:
-  Box3f gather_positions(QuantiseAxis (&axes)[3]) {
-    const std::array<const float*, 3> sources{columns_.position->x(), columns_.position->y(),
-                                              columns_.position->z()};
-    Box3f box;
-    for (int axis = 0; axis < 3; ++axis) {
-      auto& column = scratch_.position[static_cast<std::size_t>(axis)];
-      gather_floats(sources[static_cast<std::size_t>(axis)] + samples_.begin, samples_.stride, samples_.count,
-                    column.data());
-      minimum_and_maximum(column.data(), samples_.count, box.min[axis], box.max[axis]);
-      axes[axis] = quantise_axis(box.min[axis], box.max[axis]);
-    }
-    return box;
-  }
-
-  /// The chunk's values of a column, or zeros where it is empty.
-  const float* chunk_of(std::span<const float> column, std::size_t first, std::size_t count,
-                        std::size_t buffer) {
-    if (column.empty()) return kZeros.data();
-    gather_floats(column.data() + samples_.begin + first * samples_.stride, samples_.stride, count,
-                  scratch_.chunk[buffer].data());
-    return scratch_.chunk[buffer].data();
-  }
-
-  std::byte* write_positions(const QuantiseAxis (&axes)[3], std::byte* out) {
-    const std::span<const float> t = has(attributes_, kFrameT) ? columns_.t : std::span<const float>{};
-    for_chunks(samples_.count, [&](std::size_t first, std::size_t count) {
-      const float* t_chunk = chunk_of(t, first, count, 0);
-      quantise_positions(axes, &scratch_.position[0][first], &scratch_.position[1][first],
-                         &scratch_.position[2][first], t_chunk, count, scratch_.words.data());
-      out = copy_words(scratch_.words.data(), 2 * count, out);
-    });
-    return out;
-  }
-
-  std::byte* write_normals(std::byte* out) {
-    const Points& normal = *columns_.normal;
-    for_chunks(samples_.count, [&](std::size_t first, std::size_t count) {
-      const float* x = chunk_of({normal.x(), normal.size()}, first, count, 0);
-      const float* y = chunk_of({normal.y(), normal.size()}, first, count, 1);
-      const float* z = chunk_of({normal.z(), normal.size()}, first, count, 2);
-      quantise_normals(x, y, z, count, scratch_.words.data());
-      out = copy_words(scratch_.words.data(), count, out);
-    });
-    return out;
-  }
-
-  std::byte* write_detail(std::byte* out) {
-    for_chunks(samples_.count, [&](std::size_t first, std::size_t count) {
-      quantise_detail(chunk_of(columns_.detail, first, count, 0), chunk_of(columns_.stretch, first, count, 1),
-                      state_.detail_range, state_.stretch_range, count, scratch_.words.data());
-      out = copy_words(scratch_.words.data(), count, out);
-    });
-    return out;
-  }
-
-  /// A column that goes out as it is, zero-padded to whole words.
-  template <typename T>
-  std::byte* write_column(std::span<const T> column, std::byte* out) {
-    const T* source = column.data() + samples_.begin;
-    for (std::size_t i = 0; i < samples_.count; ++i) store(out + i * sizeof(T), source[i * samples_.stride]);
-    const std::size_t bytes = samples_.count * sizeof(T);
-    std::fill(out + bytes, out + padded_to_word(bytes), std::byte{0});
-    return out + padded_to_word(bytes);
-  }
-
-  const FrameLayout& layout_;
-  const FrameColumns& columns_;
-  const FrameState& state_;
-  std::uint16_t attributes_;
-  Scratch scratch_;
-  SampleRange samples_;
-};
 
 SurfaceBounds ball_of(const Box3f& box) {
   if (box.is_empty()) return {};
@@ -202,6 +71,80 @@ void write_header(const FrameHeader& header, std::size_t frame_bytes, std::byte*
   store(out + 92, header.bounds.radius);
 }
 
+/// The records of the given blocks, one after the other; returns the bytes of the frame.
+std::size_t place_records(const FrameLayout& layout, std::uint16_t attributes,
+                          std::span<const std::uint32_t> blocks, std::vector<BlockRecord>& records) {
+  std::size_t frame_bytes = kFrameHeaderBytes;
+  records.reserve(blocks.size());
+  for (const std::uint32_t block : blocks) {
+    const std::uint32_t count = layout.block_samples(block).count;
+    records.push_back({.number = block, .count = count, .offset = frame_bytes});
+    frame_bytes += block_record_bytes(count, attributes);
+  }
+  POINTWRIGHT_CHECK(frame_bytes <= std::numeric_limits<std::uint32_t>::max(), "a frame beyond 4 GiB");
+  return frame_bytes;
+}
+
+/// The pieces of the records, window by window of the cloud and layer by layer in each: every window is read
+/// once, though its samples go to blocks of all layers.
+std::vector<BlockPiece> cut_pieces(const FrameLayout& layout, const std::vector<BlockRecord>& records) {
+  constexpr std::uint32_t kAbsent = 0xFFFFFFFFU;
+  std::vector<std::uint32_t> record_of(layout.block_count(), kAbsent);
+  for (std::uint32_t i = 0; i < records.size(); ++i) record_of[records[i].number] = i;
+  std::vector<BlockPiece> pieces;
+  pieces.reserve(records.size() + std::size_t{kLayerCount} * (layout.sample_count() / kPieceWindow + 1));
+  for (std::uint64_t window = 0; window < layout.sample_count(); window += kPieceWindow) {
+    // The finest layer first: it reads every cache line in a row, as memory likes it best.
+    for (std::uint32_t layer = kLayerCount; layer-- > 0;) {
+      const SampleRange samples = layout.layer_samples(layer);
+      // Windows start at multiples of every stride.
+      const auto end = static_cast<std::uint32_t>(
+          std::min<std::uint64_t>(samples.count, (window + kPieceWindow) / samples.stride));
+      for (auto index = static_cast<std::uint32_t>(window / samples.stride); index < end;) {
+        const std::uint32_t lane = index % layout.block_size();
+        const std::uint32_t count = std::min(end - index, layout.block_size() - lane);
+        const std::uint32_t record = record_of[layout.first_block(layer) + index / layout.block_size()];
+        if (record != kAbsent) {
+          pieces.push_back({.record = record,
+                            .lane = lane,
+                            .samples = {.begin = samples.begin + index * samples.stride,
+                                        .stride = samples.stride,
+                                        .count = count}});
+        }
+        index += count;
+      }
+    }
+  }
+  return pieces;
+}
+
+/// Finds the box of every record; returns the box of them all.
+Box3f measure_records(const std::vector<BlockPiece>& pieces, const FrameColumns& columns,
+                      const FrameState& state, std::vector<BlockRecord>& records) {
+  std::vector<Box3f> piece_boxes(pieces.size());
+  parallel_for(
+      pieces.size(),
+      [&](std::size_t begin, std::size_t end) {
+        BlockWriter writer(columns, state, 0);
+        for (std::size_t i = begin; i < end; ++i) piece_boxes[i] = writer.bounds(pieces[i]);
+      },
+      kPiecesPerTask);
+  std::vector<Box3f> boxes(records.size());
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    boxes[pieces[i].record].extend(piece_boxes[i].min);
+    boxes[pieces[i].record].extend(piece_boxes[i].max);
+  }
+  Box3f whole;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      records[i].axes[static_cast<std::size_t>(axis)] = quantise_axis(boxes[i].min[axis], boxes[i].max[axis]);
+    }
+    whole.extend(boxes[i].min);
+    whole.extend(boxes[i].max);
+  }
+  return whole;
+}
+
 /// Encodes the given blocks in the given order.
 void encode_frame(FrameKind kind, const FrameLayout& layout, const FrameColumns& columns,
                   const FrameState& state, std::uint16_t attributes, std::span<const std::uint32_t> blocks,
@@ -209,61 +152,40 @@ void encode_frame(FrameKind kind, const FrameLayout& layout, const FrameColumns&
   check_columns(layout, columns, attributes);
   POINTWRIGHT_CHECK(state.revision <= kMaxSequence && state.sequence <= kMaxSequence,
                     "a number beyond 2^53 - 1");
-  std::vector<std::size_t> offsets(blocks.size());
-  std::vector<std::uint32_t> begins(blocks.size());
-  std::size_t frame_bytes = kFrameHeaderBytes;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    const SampleRange samples = layout.block_samples(blocks[i]);
-    offsets[i] = frame_bytes;
-    begins[i] = samples.begin;
-    frame_bytes += block_record_bytes(samples.count, attributes);
-  }
-  POINTWRIGHT_CHECK(frame_bytes <= std::numeric_limits<std::uint32_t>::max(), "a frame beyond 4 GiB");
+  std::vector<BlockRecord> records;
+  const std::size_t frame_bytes = place_records(layout, attributes, blocks, records);
+  const std::vector<BlockPiece> pieces = cut_pieces(layout, records);
+  const Box3f box = measure_records(pieces, columns, state, records);
   out.resize(frame_bytes);
-
-  // Blocks of several layers read the same cache lines: taken by place in the cloud, memory is read once.
-  std::vector<std::uint32_t> jobs(blocks.size());
-  std::iota(jobs.begin(), jobs.end(), 0U);
-  std::sort(jobs.begin(), jobs.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return begins[a] != begins[b] ? begins[a] < begins[b] : a < b;
-  });
-  std::vector<Box3f> boxes(blocks.size());
   parallel_for(
-      jobs.size(),
+      pieces.size(),
       [&](std::size_t begin, std::size_t end) {
-        BlockEncoder encoder(layout, columns, state, attributes);
+        BlockWriter writer(columns, state, attributes);
         for (std::size_t i = begin; i < end; ++i) {
-          boxes[jobs[i]] = encoder.encode(blocks[jobs[i]], out.data() + offsets[jobs[i]]);
+          const BlockRecord& record = records[pieces[i].record];
+          writer.write(pieces[i], record, out.data() + record.offset);
         }
       },
-      kBlocksPerTask);
+      kPiecesPerTask);
 
-  FrameHeader header{.kind = kind,
-                     .level = state.level,
-                     .attributes = attributes,
-                     .revision = state.revision,
-                     .sequence = state.sequence,
-                     .sample_count = layout.sample_count(),
-                     .block_size = layout.block_size(),
-                     .block_count = layout.block_count(),
-                     .present_blocks = static_cast<std::uint32_t>(blocks.size()),
-                     .origin = state.origin,
-                     .detail_range = has(attributes, kFrameDetail) ? state.detail_range : 0.0F,
-                     .stretch_range = has(attributes, kFrameDetail) ? state.stretch_range : 0.0F,
-                     .bounds = {}};
-  if (state.bounds) {
-    header.bounds = *state.bounds;
-  } else if (kind == FrameKind::kDelta) {
-    header.bounds = surface_bounds(*columns.position);
-  } else {
-    Box3f whole;
-    for (const Box3f& box : boxes) {
-      whole.extend(box.min);
-      whole.extend(box.max);
-    }
-    header.bounds = ball_of(whole);
-  }
-  write_header(header, frame_bytes, out.data());
+  const bool has_detail = has(attributes, kFrameDetail);
+  const SurfaceBounds bounds = state.bounds              ? *state.bounds
+                               : kind == FrameKind::kKey ? ball_of(box)
+                                                         : surface_bounds(*columns.position);
+  write_header({.kind = kind,
+                .level = state.level,
+                .attributes = attributes,
+                .revision = state.revision,
+                .sequence = state.sequence,
+                .sample_count = layout.sample_count(),
+                .block_size = layout.block_size(),
+                .block_count = layout.block_count(),
+                .present_blocks = static_cast<std::uint32_t>(blocks.size()),
+                .origin = state.origin,
+                .detail_range = has_detail ? state.detail_range : 0.0F,
+                .stretch_range = has_detail ? state.stretch_range : 0.0F,
+                .bounds = bounds},
+               frame_bytes, out.data());
 }
 
 }  // namespace
@@ -299,16 +221,20 @@ void encode_delta_frame(const FrameLayout& layout, const FrameColumns& columns, 
 }
 
 SurfaceBounds surface_bounds(const Points& position) {
-  std::vector<Box3f> boxes((position.size() + kParallelBlock - 1) / kParallelBlock);
-  const std::array<const float*, 3> sources{position.x(), position.y(), position.z()};
-  parallel_for(position.size(), [&](std::size_t begin, std::size_t end) {
-    std::array<float, kParallelBlock> values;
-    Box3f& box = boxes[begin / kParallelBlock];
-    for (int axis = 0; axis < 3; ++axis) {
-      gather_floats(sources[static_cast<std::size_t>(axis)] + begin, 1, end - begin, values.data());
-      minimum_and_maximum(values.data(), end - begin, box.min[axis], box.max[axis]);
-    }
-  });
+  const FrameColumns columns{.position = &position};
+  const FrameState state;
+  std::vector<Box3f> boxes((position.size() + kPieceLanes - 1) / kPieceLanes);
+  parallel_for(
+      boxes.size(),
+      [&](std::size_t begin, std::size_t end) {
+        BlockWriter writer(columns, state, 0);
+        for (std::size_t i = begin; i < end; ++i) {
+          const std::size_t first = i * kPieceLanes;
+          const auto count = static_cast<std::uint32_t>(std::min(kPieceLanes, position.size() - first));
+          boxes[i] = writer.bounds({.samples = {.begin = static_cast<std::uint32_t>(first), .count = count}});
+        }
+      },
+      kPiecesPerTask);
   Box3f whole;
   for (const Box3f& box : boxes) {
     whole.extend(box.min);

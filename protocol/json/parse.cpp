@@ -145,6 +145,12 @@ Parsed<Json> parse_json(std::string_view text, const ParseLimits& limits) {
                        std::to_string(limits.max_bytes));
     return errors;
   }
+  // The library takes a NUL for the end of the text and would pass over whatever follows.
+  if (const std::size_t nul = text.find('\0'); nul != std::string_view::npos) {
+    JsonErrors errors{.kind = JsonErrorKind::kMalformed, .faults = {}};
+    errors.add("", "malformed JSON at byte " + std::to_string(nul + 1));
+    return errors;
+  }
   DocumentBuilder builder(limits);
   if (!Json::sax_parse(text.begin(), text.end(), &builder)) return std::move(builder.errors());
   return builder.take_document();

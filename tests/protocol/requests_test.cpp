@@ -176,7 +176,7 @@ TEST_CASE("a session names its cloud; the rest has defaults") {
 TEST_CASE("what was read is written back and read again to the bit") {
   for (
       const char* text :
-      {R"({"mode":"add","shape":{"type":"sphere","center":[0.1,0.2,0.30000000000000004],"radius":1e-9}})",
+      {R"({"mode":"add","shape":{"type":"sphere","center":[0.1,0.2,0.30000000000000004],"radius":1e-09}})",
        R"({"mode":"set","shape":{"type":"stroke","vertices":[[0.0,1.0,2.0]],"radius":0.5},"facing":[0.0,0.0,1.0],"steal":true})",
        R"({"mode":"remove","shape":{"type":"box","min":[-1.0,-1.0,-1.0],"max":[1.0,1.0,1.0]}})",
        R"({"mode":"intersect","shape":{"type":"half_space","point":[0.0,0.0,0.0],"normal":[0.0,1.0,0.0]}})",
