@@ -69,7 +69,7 @@ serve: ## run the editor on http://$(HOST):$(PORT) until Ctrl-C
 	@.ci/setup build web
 	@$(MAKE) --no-print-directory sample viewer
 	@echo "serve: open http://$(HOST):$(PORT)/ in a browser; Ctrl-C ends it"
-	@exec $(daemon) --host $(HOST) --port $(PORT) --web-root web/dist --sample "$(dragon)=Stanford dragon"
+	@exec $(daemon) --host $(HOST) --port $(PORT) --web web/dist --sample "$(dragon)=Stanford dragon"
 
 test: ## every check and every test; the last line counts them (LANES="format cpp" for some)
 	@.ci/setup build web view lint
