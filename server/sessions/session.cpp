@@ -290,7 +290,7 @@ Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request) {
   if (request.sequence <= newest_sequence_ && now - newest_sequence_time_ < kReorderWindow) return Done{};
   newest_sequence_ = request.sequence;
   newest_sequence_time_ = now;
-  pending_preview_ = request;
+  pending_preview_ = std::make_shared<const protocol::PreviewRequest>(request);
   if (!preview_scheduled_) {
     preview_scheduled_ = true;
     strand_.post([self = shared_from_this()] { self->run_preview(); });
@@ -299,7 +299,7 @@ Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request) {
 }
 
 void Session::run_preview() {
-  std::optional<protocol::PreviewRequest> request;
+  std::shared_ptr<const protocol::PreviewRequest> request;
   {
     const std::lock_guard lock(preview_mutex_);
     request.swap(pending_preview_);

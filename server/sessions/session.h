@@ -177,7 +177,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::atomic<bool> field_scheduled_{false};
 
   std::mutex preview_mutex_;  // guards the pending preview
-  std::optional<protocol::PreviewRequest> pending_preview_;
+  std::shared_ptr<const protocol::PreviewRequest> pending_preview_;
   bool preview_scheduled_ = false;
   std::uint64_t newest_sequence_ = 0;
   std::chrono::steady_clock::time_point newest_sequence_time_;

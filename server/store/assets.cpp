@@ -54,7 +54,8 @@ AssetTable AssetTable::load(const std::string& folder) {
     if (!bytes) throw std::runtime_error(bytes.error().message);
     total += bytes.value().size();
     const auto owner = std::make_shared<const std::vector<std::byte>>(std::move(bytes).value());
-    const std::string path = "/" + fs::relative(it->path(), folder).generic_string();
+    std::string path(1, '/');
+    path += fs::relative(it->path(), folder).generic_string();
     table.assets_[path] = {.bytes = {.owner = owner, .bytes = *owner},
                            .content_type = content_type_of(it->path().extension().string()),
                            .etag = std::string(1, '"').append(sha256_hex(*owner), 0, 32).append(1, '"')};

@@ -1,0 +1,440 @@
+// Routes and handlers without a socket: a request goes in, a response comes out.
+
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "engine/io/cloud_io.h"
+#include "protocol/frames/frame.h"
+#include "protocol/frames/stream_record.h"
+#include "server/handlers/openapi.h"
+#include "server/handlers/service.h"
+#include "server/routes/routes.h"
+#include "synthetic.h"
+
+using namespace pointwright;
+using namespace pointwright::server;
+using nlohmann::json;
+
+namespace {
+
+const std::string kSphere = R"({"mode":"add","shape":{"type":"sphere","center":[0,0.5,0],"radius":0.3}})";
+const std::string kBox = R"({"mode":"add","shape":{"type":"box","min":[0.8,-1,-1],"max":[2,2,1]}})";
+const std::string kLift = R"({"level":0,"deformation":{"type":"translation","vector":[0,0,0.5]}})";
+
+struct Answer {
+  int status = 0;
+  json body;
+  std::string bytes;
+  std::vector<NameValue> headers;
+  std::string content_type;
+  [[nodiscard]] std::string header(const std::string& name) const {
+    for (const NameValue& entry : headers)
+      if (entry.first == name) return entry.second;
+    return {};
+  }
+};
+
+/// A service whose decoder runs in this process.
+struct TestService {
+  explicit TestService(Config config = {})
+      : service(std::move(config),
+                {.decode = [](std::span<const std::byte> bytes, CloudFormat format,
+                              const ImportParams& params) { return read_cloud(bytes, format, params); },
+                 .build = build_hierarchy,
+                 .assets = {}}) {}
+
+  Answer ask(Method method, const std::string& target, const std::string& body = "",
+             std::vector<NameValue> headers = {}) {
+    RequestHead head{.method = method};
+    const std::size_t mark = target.find('?');
+    head.path = target.substr(0, mark);
+    if (mark != std::string::npos) {
+      std::string query = target.substr(mark + 1);
+      while (!query.empty()) {
+        const std::size_t end = std::min(query.find('&'), query.size());
+        const std::string pair = query.substr(0, end);
+        query.erase(0, end + 1);
+        const std::size_t equals = std::min(pair.find('='), pair.size());
+        head.query.emplace_back(pair.substr(0, equals), equals < pair.size() ? pair.substr(equals + 1) : "");
+      }
+    }
+    head.headers = std::move(headers);
+    head.headers.emplace_back("content-length", std::to_string(body.size()));
+    head.content_length = body.size();
+    Resolution resolution = resolve(service, head, "test-request");
+    Response response;
+    if (auto* endpoint = std::get_if<Endpoint>(&resolution)) {
+      response = endpoint->handle(
+          Request{.head = head, .id = "test-request", .captures = endpoint->captures, .body = body});
+    } else {
+      response = std::move(std::get<Response>(resolution));
+    }
+    return read(std::move(response));
+  }
+  Answer get(const std::string& target, std::vector<NameValue> headers = {}) {
+    return ask(Method::kGet, target, "", std::move(headers));
+  }
+
+  std::string upload(std::size_t side = 30) {
+    const auto file = write_cloud(pointwright::test::wavy_sheet(side), CloudFormat::kPly, {});
+    REQUIRE(file.ok());
+    const Answer answer =
+        ask(Method::kPost, "/v1/clouds?name=sheet",
+            std::string(reinterpret_cast<const char*>(file.value().data()), file.value().size()),
+            {{"content-type", "application/octet-stream"}});
+    REQUIRE(answer.status == 201);
+    return answer.body["id"];
+  }
+  /// The path of a session that is ready, on a cloud of its own.
+  std::string open_session() {
+    const std::string cloud = upload();
+    const Answer made = ask(Method::kPost, "/v1/sessions", R"({"cloud":")" + cloud + R"(","scales":[0.05]})");
+    REQUIRE(made.status == 202);
+    const std::string path = made.header("Location");
+    for (int i = 0; i < 5000 && get(path).body["state"] == "building"; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    REQUIRE(get(path).body["state"] == "ready");
+    return path;
+  }
+  std::string open_painted() {
+    const std::string path = open_session();
+    REQUIRE(ask(Method::kPost, path + "/regions/zero/operations", kSphere).status == 200);
+    REQUIRE(ask(Method::kPost, path + "/regions/one/operations", kBox).status == 200);
+    return path;
+  }
+
+  Service service;
+
+ private:
+  static Answer read(Response response) {
+    Answer answer{
+        .status = response.status, .headers = response.headers, .content_type = response.content_type};
+    if (auto* text = std::get_if<std::string>(&response.body)) answer.bytes = std::move(*text);
+    if (auto* shared = std::get_if<SharedBytes>(&response.body))
+      answer.bytes.assign(reinterpret_cast<const char*>(shared->bytes.data()), shared->bytes.size());
+    if (answer.content_type.find("json") != std::string::npos) answer.body = json::parse(answer.bytes);
+    return answer;
+  }
+};
+
+std::vector<NameValue> if_match(const std::string& tag) {
+  return {{"if-match", tag}};
+}
+
+}  // namespace
+
+TEST_CASE("every route is in the API's description, and everything described has a route") {
+  const json openapi = json::parse(openapi_json());
+  CHECK(openapi_yaml().substr(0, 8) == "openapi:");
+  std::set<std::string> described;
+  for (const auto& [path, operations] : openapi["paths"].items()) {
+    if (path == "/assets/{file}") continue;  // answered from the table of files
+    std::string pattern = path;
+    for (const char* name : {"{cloud}", "{session}"})
+      if (const std::size_t at = pattern.find(name); at != std::string::npos)
+        pattern.replace(at, std::strlen(name), "{id}");
+    for (const auto& [method, operation] : operations.items())
+      if (method != "parameters") described.insert(method + " " + pattern);
+  }
+  std::set<std::string> routed;
+  for (const Route& route : all_routes()) {
+    std::string method(method_name(route.method));
+    for (char& c : method) c = static_cast<char>(std::tolower(c));
+    routed.insert(method + " " + std::string(route.pattern));
+  }
+  CHECK(routed == described);
+}
+
+TEST_CASE("paths are matched segment by segment, with well-formed ids only") {
+  std::vector<std::string> captures;
+  const std::string id = "abcdefghijklmnopqrst-_";
+  CHECK(matches("/v1/sessions/{id}/regions/{region}", "/v1/sessions/" + id + "/regions/one", captures));
+  CHECK(captures == std::vector<std::string>{id, "one"});
+  CHECK_FALSE(matches("/v1/sessions/{id}", "/v1/sessions/" + id + "/", captures));
+  CHECK_FALSE(matches("/v1/sessions/{id}", "/v1/sessions/" + id + "x", captures));
+  CHECK_FALSE(matches("/v1/sessions/{id}", "/v1/sessions/../../etc/passwd12345", captures));
+  CHECK_FALSE(matches("/v1/sessions/{id}", "/v1/sessions", captures));
+  CHECK_FALSE(matches("/v1/sessions/{id}/regions/{region}", "/v1/sessions/" + id + "/regions/two", captures));
+}
+
+TEST_CASE("unknown paths are 404, wrong methods 405 with what is allowed") {
+  TestService test;
+  CHECK(test.get("/nothing").status == 404);
+  CHECK(test.get("/v1/clouds/AAAAAAAAAAAAAAAAAAAAAA").status == 404);
+  CHECK(test.get("/v1/sessions/AAAAAAAAAAAAAAAAAAAAAA").status == 404);
+  const Answer wrong = test.ask(Method::kPut, "/v1/clouds");
+  CHECK(wrong.status == 405);
+  CHECK(wrong.header("Allow") == "GET, HEAD, POST, OPTIONS");
+  CHECK(wrong.body["type"] == "/problems/method-not-allowed");
+  CHECK(test.ask(Method::kOptions, "/v1/info").status == 204);
+  CHECK(test.ask(Method::kHead, "/v1/info").status == 200);
+}
+
+TEST_CASE("the service says what it is, what it can and where everything is") {
+  TestService test;
+  CHECK(test.get("/").body["service"] == "pointwright");
+  CHECK(test.get("/healthz").body["status"] == "alive");
+  CHECK(test.get("/readyz").status == 200);
+  test.service.stopping = true;
+  CHECK(test.get("/readyz").status == 503);
+  const json info = test.get("/v1/info").body;
+  CHECK(info["limits"].size() == limit_table().size());
+  CHECK(info["limits"]["max_samples"] == Limits{}.max_samples);
+  for (const protocol::ProblemInfo& problem : protocol::all_problems())
+    CHECK(test.get("/problems/" + std::string(problem.slug)).status == 200);
+  CHECK(test.get("/problems/no-such-thing").status == 404);
+  CHECK(test.get("/openapi.json").body["openapi"] == "3.1.0");
+  CHECK(test.get("/openapi.yaml").bytes == openapi_yaml());
+}
+
+TEST_CASE("an uploaded cloud is described, listed, given back and deleted") {
+  TestService test;
+  const std::string id = test.upload(20);
+  const Answer cloud = test.get("/v1/clouds/" + id);
+  CHECK(cloud.body["sample_count"] == 400);
+  CHECK(cloud.body["name"] == "sheet");
+  CHECK(cloud.body["sha256"].get<std::string>().size() == 64);
+  CHECK(test.get("/v1/clouds/" + id, {{"if-none-match", cloud.header("ETag")}}).status == 304);
+  CHECK(test.get("/v1/clouds").body["clouds"].size() == 1);
+
+  const Answer data = test.get("/v1/clouds/" + id + "/data?format=ply");
+  CHECK(data.status == 200);
+  CHECK(data.content_type == "application/x-ply");
+  const auto back =
+      read_cloud(std::as_bytes(std::span(data.bytes.data(), data.bytes.size())), CloudFormat::kPly, {});
+  REQUIRE(back.ok());
+  CHECK(back.value().cloud.position == test::wavy_sheet(20).position);
+  CHECK(test.get("/v1/clouds/" + id + "/data", {{"accept", "model/x-draco"}}).content_type ==
+        "model/x-draco");
+  CHECK(test.get("/v1/clouds/" + id + "/data", {{"accept", "image/png"}}).status == 406);
+  CHECK(test.get("/v1/clouds/" + id + "/data?format=obj").status == 422);
+
+  CHECK(test.ask(Method::kDelete, "/v1/clouds/" + id).status == 204);
+  CHECK(test.get("/v1/clouds/" + id).status == 404);
+}
+
+TEST_CASE("bad uploads are told why") {
+  TestService test;
+  const auto status = [&](const std::string& target, const std::string& body,
+                          const char* type = "application/octet-stream") {
+    return test.ask(Method::kPost, target, body, {{"content-type", type}}).status;
+  };
+  CHECK(status("/v1/clouds", "") == 400);
+  CHECK(status("/v1/clouds", "\x7f\x45LF what is this") == 415);
+  CHECK(status("/v1/clouds", "not a ply", "application/x-ply") == 422);
+  CHECK(status("/v1/clouds", "0 0 0\n0 1 nan\n", "text/plain") == 422);
+  CHECK(status("/v1/clouds?nonfinite=drop", "0 0 0\n0 1 nan\n1 1 1\n", "text/plain") == 201);
+  CHECK(status("/v1/clouds?nonfinite=maybe", "0 0 0\n") == 422);
+  CHECK(status("/v1/clouds?colour=red", "0 0 0\n") == 422);
+  CHECK(status("/v1/clouds?name=a&name=b", "0 0 0\n") == 422);
+  CHECK(status("/v1/clouds?name=", "0 0 0\n") == 422);
+  CHECK(test.get("/v1/clouds").body["clouds"].size() == 1);
+}
+
+TEST_CASE("quotas refuse with the limit and take again what was freed") {
+  Config config;
+  config.limits.max_clouds = 2;
+  config.limits.max_sessions = 1;
+  config.limits.max_samples = 1000;
+  TestService test(config);
+  const std::string first = test.upload(20);
+  const Answer session = test.ask(Method::kPost, "/v1/sessions", R"({"cloud":")" + first + R"("})");
+  CHECK(session.status == 202);
+  CHECK(test.ask(Method::kPost, "/v1/sessions", R"({"cloud":")" + first + R"("})").status == 429);
+  CHECK(test.ask(Method::kDelete, "/v1/clouds/" + first).status == 409);
+
+  const auto large = write_cloud(test::wavy_sheet(40), CloudFormat::kPly, {});
+  const std::string bytes(reinterpret_cast<const char*>(large.value().data()), large.value().size());
+  const Answer refused =
+      test.ask(Method::kPost, "/v1/clouds", bytes, {{"content-type", "application/x-ply"}});
+  CHECK(refused.status == 413);
+  CHECK(refused.body["limit"] == 1000);
+  CHECK(refused.body["actual"] == 1600);
+
+  test.upload(10);
+  const Answer full = test.ask(Method::kPost, "/v1/clouds", "0 0 0\n", {{"content-type", "text/plain"}});
+  CHECK(full.status == 429);
+  CHECK_FALSE(full.header("Retry-After").empty());
+  CHECK(test.ask(Method::kDelete, session.header("Location")).status == 204);
+  CHECK(test.ask(Method::kDelete, "/v1/clouds/" + first).status == 204);
+  CHECK(test.ask(Method::kPost, "/v1/clouds", "0 0 0\n", {{"content-type", "text/plain"}}).status == 201);
+}
+
+TEST_CASE("memory that is used up is 507") {
+  Config config;
+  config.limits.max_cloud_bytes = 20'000;
+  config.limits.max_session_bytes = 100'000;
+  TestService test(config);
+  const std::string small = test.upload(20);
+  const auto file = write_cloud(test::wavy_sheet(30), CloudFormat::kPly, {});
+  CHECK(test.ask(Method::kPost, "/v1/clouds",
+                 std::string(reinterpret_cast<const char*>(file.value().data()), file.value().size()),
+                 {{"content-type", "application/x-ply"}})
+            .status == 507);
+  CHECK(test.ask(Method::kPost, "/v1/sessions", R"({"cloud":")" + small + R"("})").status == 507);
+}
+
+TEST_CASE("bodies are documents of exactly the described kind") {
+  TestService test;
+  const std::string path = test.open_session();
+  const auto status = [&](const std::string& body) {
+    return test.ask(Method::kPost, path + "/regions/zero/operations", body).status;
+  };
+  CHECK(status("") == 400);
+  CHECK(status("{") == 400);
+  CHECK(status("[]") == 422);
+  CHECK(status(R"({"mode":"add","shape":{"type":"sphere","center":[0,0,0],"radius":1},"colour":1})") == 422);
+  CHECK(status(R"({"mode":"add","mode":"set","shape":{"type":"all"}})") == 422);
+  CHECK(status(R"({"mode":"add","shape":{"type":"sphere","center":[0,0,0],"radius":-1}})") == 422);
+  CHECK(status(R"({"mode":"add","shape":{"type":"sphere","center":[0,0,1e999],"radius":1}})") == 422);
+  CHECK(status(std::string(100, '[') + std::string(100, ']')) == 422);
+  const Answer wrong = test.ask(Method::kPost, path + "/regions/zero/operations",
+                                R"({"mode":"add","shape":{"type":"sphere","center":[0,0,0],"radius":true}})");
+  CHECK(wrong.status == 422);
+  CHECK(wrong.body["errors"][0]["pointer"] == "/shape/radius");
+  CHECK(wrong.body["request_id"] == "test-request");
+  CHECK(test.get(path).body["revision"] == 0);
+}
+
+TEST_CASE("regions are painted, read, replaced and cleared") {
+  TestService test;
+  const std::string path = test.open_session();
+  const Answer painted = test.ask(Method::kPost, path + "/regions/zero/operations", kSphere);
+  CHECK(painted.status == 200);
+  CHECK(painted.body["changed"] == painted.body["regions"]["zero"]["samples"]);
+  CHECK(painted.header("ETag") == "\"r1\"");
+  const Answer region = test.get(path + "/regions/zero");
+  CHECK(region.body["operations"].size() == 1);
+  CHECK(region.body["operations"][0]["shape"]["type"] == "sphere");
+  CHECK(test.ask(Method::kPut, path + "/regions/zero", R"({"operations":[)" + kBox + "]}")
+            .body["regions"]["zero"]["operations"] == 1);
+  CHECK(test.ask(Method::kDelete, path + "/regions/zero").body["regions"]["zero"]["samples"] == 0);
+  CHECK(test.get(path + "/regions/middle").status == 404);
+}
+
+TEST_CASE("an edit owes the current revision") {
+  TestService test;
+  const std::string path = test.open_painted();
+  const auto edit = [&](std::vector<NameValue> headers) {
+    return test.ask(Method::kPost, path + "/edits", kLift, std::move(headers));
+  };
+  CHECK(edit({}).status == 428);
+  CHECK(edit(if_match("r2")).status == 400);
+  CHECK(edit(if_match("\"rx\"")).status == 400);
+  const Answer stale = edit(if_match("\"r1\""));
+  CHECK(stale.status == 412);
+  CHECK(stale.body["revision"] == 2);
+  const Answer made = edit(if_match("\"r2\""));
+  CHECK(made.status == 201);
+  CHECK(made.header("ETag") == "\"r3\"");
+  CHECK(made.body["index"] == 1);
+  CHECK(made.body["moved_samples"] > 0);
+  const json history = test.get(path + "/edits").body;
+  CHECK(history["head"] == 1);
+  CHECK(history["edits"][0]["edit"]["deformation"]["type"] == "translation");
+  CHECK(test.ask(Method::kPut, path + "/head", R"({"edit":0})").body["history"]["head"] == 0);
+  CHECK(test.ask(Method::kPut, path + "/head", R"({"edit":9})").status == 422);
+}
+
+TEST_CASE("samples come in every format, with tags that change with the revision") {
+  TestService test;
+  const std::string path = test.open_painted();
+  const Answer before = test.get(path + "/samples?format=ply");
+  CHECK(before.status == 200);
+  CHECK(before.header("Content-Disposition") == "attachment; filename=\"sheet.ply\"");
+  CHECK(test.get(path + "/samples?format=ply", {{"if-none-match", before.header("ETag")}}).status == 304);
+  REQUIRE(test.ask(Method::kPost, path + "/edits", kLift, if_match("\"r2\"")).status == 201);
+  const Answer after = test.get(path + "/samples?format=ply", {{"if-none-match", before.header("ETag")}});
+  CHECK(after.status == 200);
+  CHECK(after.bytes != before.bytes);
+  for (const char* format : {"draco", "frame"})
+    CHECK(test.get(path + "/samples?format=" + format).status == 200);
+  const Answer frame =
+      test.get(path + "/samples?format=frame&attributes=normal,t,ids,marks,color,detail&level=0");
+  const auto decoded =
+      protocol::decode_frame(std::as_bytes(std::span(frame.bytes.data(), frame.bytes.size())));
+  REQUIRE(decoded.ok());
+  CHECK(decoded.value().header.level == 0);
+  CHECK(decoded.value().header.revision == 3);
+  CHECK(decoded.value().header.attributes == protocol::kAllFrameAttributes);
+  CHECK(test.get(path + "/samples?level=2").status == 422);
+  CHECK(test.get(path + "/samples?level=x").status == 422);
+  CHECK(test.get(path + "/samples?format=frame&attributes=smell").status == 422);
+  CHECK(test.get(path + "/samples?attributes=normal").status == 422);
+}
+
+TEST_CASE("streams begin with the session and a key frame, and end with a word") {
+  TestService test;
+  const std::string path = test.open_painted();
+  RequestHead head{.method = Method::kGet};
+  head.path = path + "/stream";
+  head.query = {{"attributes", "normal,t,marks"}};
+  Resolution resolution = resolve(test.service, head, "id");
+  auto& endpoint = std::get<Endpoint>(resolution);
+  Response response =
+      endpoint.handle(Request{.head = head, .id = "id", .captures = endpoint.captures, .body = {}});
+  REQUIRE(response.status == 200);
+
+  struct Collector final : BodySink {
+    std::vector<std::byte> bytes;
+    std::atomic<bool> stop{false};
+    bool write(std::span<const std::byte> piece) override {
+      bytes.insert(bytes.end(), piece.begin(), piece.end());
+      return true;
+    }
+    bool is_peer_gone() override { return false; }
+    [[nodiscard]] bool is_stopping() const override { return stop; }
+  } sink;
+  std::thread stopper([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    sink.stop = true;
+  });
+  std::get<StreamBody>(response.body)(sink);
+  stopper.join();
+  protocol::StreamRecordParser parser;
+  parser.push(sink.bytes);
+  std::vector<protocol::StreamRecord> records;
+  while (true) {
+    auto next = parser.next();
+    REQUIRE(next.ok());
+    if (!next.value()) break;
+    records.push_back(*next.value());
+  }
+  CHECK(parser.at_record_end());
+  REQUIRE(records.size() >= 3);
+  const auto event = [](const protocol::StreamRecord& record) {
+    return json::parse(reinterpret_cast<const char*>(record.payload.data()),
+                       reinterpret_cast<const char*>(record.payload.data()) + record.payload.size());
+  };
+  CHECK(event(records.front())["event"] == "session");
+  CHECK(records[1].type == 1);
+  const auto frame = protocol::decode_frame(records[1].payload);
+  REQUIRE(frame.ok());
+  CHECK(frame.value().header.kind == protocol::FrameKind::kKey);
+  CHECK(event(records.back())["event"] == "end");
+}
+
+TEST_CASE("no more streams than the limit says") {
+  Config config;
+  config.limits.max_streams = 1;
+  TestService test(config);
+  const std::string path = test.open_session();
+  RequestHead head{.method = Method::kGet};
+  head.path = path + "/stream";
+  {
+    Resolution resolution = resolve(test.service, head, "id");
+    auto& endpoint = std::get<Endpoint>(resolution);
+    const Response open =
+        endpoint.handle(Request{.head = head, .id = "id", .captures = endpoint.captures, .body = {}});
+    CHECK(open.status == 200);
+    const Answer refused = test.get(path + "/stream");
+    CHECK(refused.status == 503);
+    CHECK_FALSE(refused.header("Retry-After").empty());
+  }
+  CHECK(test.get(path + "/stream?attributes=ids").status == 422);
+  CHECK(test.get(path + "/stream").status == 200);
+}
