@@ -1,6 +1,6 @@
 // The README's shell lines run as they stand there: the fenced block after the marker, against a daemon of our own.
 // Only the address differs.
-import { mkdirSync, mkdtempSync, rmSync, symlinkSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { startDaemon } from "../../web/demo/daemon.mjs";
@@ -30,6 +30,8 @@ export async function readme() {
         timeoutSeconds: 120,
       },
     );
+    if (status === 0 && readFileSync(join(folder, "build/edited.ply")).subarray(0, 4).toString() !== "ply\n")
+      return verdict(["README.md: build/edited.ply is no PLY file"]);
     return verdict(
       status === 0 ? [] : [`README.md: its lines ended with ${status}:\n${output}\n${daemon.log()}`],
     );
