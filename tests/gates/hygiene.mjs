@@ -32,7 +32,7 @@ async function bigFiles() {
 
 async function sizes() {
   const limits = [
-    { files: /^(engine|protocol|server)\/.*\.h$/, lines: 180 },
+    { files: /^(engine|protocol|server)\/.*\.h$/, lines: 200 },
     { files: /^(engine|protocol|server)\/.*\.cpp$/, lines: 600 },
     { files: /^tests\/.*\.(h|cpp|mjs)$/, lines: 900 },
     { files: /^web\/(src|scripts|demo)\/.*\.(ts|mjs)$/, lines: 450, except: /\.d\.ts$/ },
