@@ -191,7 +191,12 @@ export function checkHeader(header: FrameHeader, length: number, limits: FrameLi
 }
 
 /** The block record at `offset`, which must have come whole. */
-export function readBlock(bytes: Uint8Array, view: DataView, offset: number, header: FrameHeader): FrameBlock {
+export function readBlock(
+  bytes: Uint8Array,
+  view: DataView,
+  offset: number,
+  header: FrameHeader,
+): FrameBlock {
   refuse(view.byteLength - offset < blockHeaderBytes, "a block record is cut off");
   const number = view.getUint32(offset, true);
   const count = view.getUint32(offset + 4, true);
