@@ -3,8 +3,8 @@ import type { ToolName } from "./event-map";
 import { VIEW_NAMES } from "./scene/camera-math";
 import type { Viewport } from "./scene/viewport";
 import type { Bus } from "./session-store";
-import type { TransformPanel } from "./ui/transform-panel";
 import { ctrl, key, type Shortcut } from "./ui/shortcuts";
+import type { TransformPanel } from "./ui/transform-panel";
 
 export interface ShortcutContext {
   bus: Bus;
@@ -34,7 +34,14 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     matches: (event) => transforming() && key(name)(event),
     run: () => editor.setAxis(editor.state.axis === name ? null : name),
   });
-  const nudge = (keys: string, name: string, label: string, right: number, up: number, zoom: number): Shortcut => ({
+  const nudge = (
+    keys: string,
+    name: string,
+    label: string,
+    right: number,
+    up: number,
+    zoom: number,
+  ): Shortcut => ({
     group: "View",
     keys,
     label,
@@ -61,14 +68,16 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
       group: "Transform",
       keys: "0 – 9",
       label: "Type the amount",
-      matches: (event) => transforming() && editor.state.axis !== null && /^[0-9.-]$/.test(event.key) && key(event.key)(event),
+      matches: (event) =>
+        transforming() && editor.state.axis !== null && /^[0-9.-]$/.test(event.key) && key(event.key)(event),
       run: (event) => transformPanel.type(event.key),
     },
     {
       group: "Transform",
       keys: "Enter",
       label: "Apply",
-      matches: (event) => editor.pending && key("Enter")(event) && !(event.target instanceof HTMLButtonElement),
+      matches: (event) =>
+        editor.pending && key("Enter")(event) && !(event.target instanceof HTMLButtonElement),
       run: () => void bus.invoke("edit.commit"),
     },
     {
@@ -82,10 +91,34 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
       },
     },
     { group: "Transform", keys: "Double click", label: "Set the pivot on the surface" },
-    { group: "History", keys: "Ctrl Z", label: "Undo", matches: ctrl("z"), run: () => void bus.invoke("edit.undo") },
-    { group: "History", keys: "Ctrl Y", label: "Redo", matches: ctrl("y"), run: () => void bus.invoke("edit.redo") },
-    { group: "History", keys: "Ctrl Shift Z", label: "Redo", matches: ctrl("z", true), run: () => void bus.invoke("edit.redo") },
-    { group: "View", keys: "F", label: "Frame the object", matches: key("f"), run: () => bus.invoke("view.frame") },
+    {
+      group: "History",
+      keys: "Ctrl Z",
+      label: "Undo",
+      matches: ctrl("z"),
+      run: () => void bus.invoke("edit.undo"),
+    },
+    {
+      group: "History",
+      keys: "Ctrl Y",
+      label: "Redo",
+      matches: ctrl("y"),
+      run: () => void bus.invoke("edit.redo"),
+    },
+    {
+      group: "History",
+      keys: "Ctrl Shift Z",
+      label: "Redo",
+      matches: ctrl("z", true),
+      run: () => void bus.invoke("edit.redo"),
+    },
+    {
+      group: "View",
+      keys: "F",
+      label: "Frame the object",
+      matches: key("f"),
+      run: () => bus.invoke("view.frame"),
+    },
     { group: "View", keys: "H", label: "The first view", matches: key("h"), run: () => viewport.rig.home() },
     ...VIEW_NAMES.map(
       (name, index): Shortcut => ({
@@ -102,6 +135,12 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     nudge("↓", "ArrowDown", "Turn down", 0, -TURN, 1),
     nudge("+", "+", "Zoom in", 0, 0, 0.9),
     nudge("-", "-", "Zoom out", 0, 0, 1 / 0.9),
-    { group: "Help", keys: "?", label: "This sheet", matches: key("?"), run: () => bus.invoke("shortcuts.show") },
+    {
+      group: "Help",
+      keys: "?",
+      label: "This sheet",
+      matches: key("?"),
+      run: () => bus.invoke("shortcuts.show"),
+    },
   ];
 }

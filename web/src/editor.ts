@@ -2,9 +2,9 @@ import type { ApiClient } from "./api/client";
 import type { SessionDocument } from "./api/types";
 import { CommandQueue } from "./command-queue";
 import { editorShortcuts } from "./editor-shortcuts";
+import { reportError } from "./edits/errors";
 import { HistoryEditor } from "./edits/history";
 import { RegionEditor } from "./edits/regions";
-import { reportError } from "./edits/errors";
 import { TransformEditor } from "./edits/transform";
 import { FrameSource } from "./frame-source";
 import { displayFromLink, type LinkState, viewHash } from "./link";
@@ -41,7 +41,13 @@ export interface Editor {
 }
 
 /** Puts the editor of a ready session together. Modules meet on the bus; what is made here lives as long as the page. */
-export function createEditor(root: HTMLElement, bus: Bus, client: ApiClient, document: SessionDocument, link: LinkState): Editor {
+export function createEditor(
+  root: HTMLElement,
+  bus: Bus,
+  client: ApiClient,
+  document: SessionDocument,
+  link: LinkState,
+): Editor {
   const store = new SessionStore(bus, document);
   const queue = new CommandQueue();
   const stage = h("div", { class: "stage" });
@@ -70,12 +76,19 @@ export function createEditor(root: HTMLElement, bus: Bus, client: ApiClient, doc
     loaded = complete;
   });
   viewport.onContext = (lost) => {
-    if (lost) bus.fire("toast", { kind: "info", title: "The graphics card was taken away", lines: ["The picture comes back by itself."] });
+    if (lost)
+      bus.fire("toast", {
+        kind: "info",
+        title: "The graphics card was taken away",
+        lines: ["The picture comes back by itself."],
+      });
     else source.restart();
   };
 
   const size: BrushSize = { radius: document.diagonal * BRUSH_PART };
-  const brushes = (["zero", "one", "erase"] as const).map((kind) => new BrushTool(kind, viewport, store, regions, size));
+  const brushes = (["zero", "one", "erase"] as const).map(
+    (kind) => new BrushTool(kind, viewport, store, regions, size),
+  );
   const setBrush = (radius: number): void => {
     size.radius = steppedRadius(radius, 0, document.diagonal);
     bus.fire("brush.radius", size.radius);

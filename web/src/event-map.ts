@@ -1,6 +1,6 @@
 import type { Deformation, History, Problem, SessionDocument } from "./api/types";
-import type { DisplaySettings } from "./scene/display";
 import type { Vec3 } from "./math/vec3";
+import type { DisplaySettings } from "./scene/display";
 
 export type ToolName = "orbit" | "zero" | "one" | "erase" | "move" | "rotate";
 

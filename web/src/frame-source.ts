@@ -1,6 +1,6 @@
 import type { ApiClient } from "./api/client";
-import { ApiError } from "./api/problem";
 import { FrameReader } from "./api/frame-reader";
+import { ApiError } from "./api/problem";
 import { SessionStream, type StreamEvent, type StreamSink } from "./api/stream";
 import { reportError } from "./edits/errors";
 import { type FrameBlock, type FrameHeader, hasAttribute } from "./protocol/frames";
@@ -28,7 +28,13 @@ export class FrameSource implements StreamSink {
   private abort_ = new AbortController();
   private told_ = 0;
 
-  constructor(bus: Bus, client: ApiClient, store: SessionStore, viewport: Viewport, onFirst: (header: FrameHeader) => void) {
+  constructor(
+    bus: Bus,
+    client: ApiClient,
+    store: SessionStore,
+    viewport: Viewport,
+    onFirst: (header: FrameHeader) => void,
+  ) {
     this.bus_ = bus;
     this.client_ = client;
     this.store_ = store;
@@ -126,7 +132,11 @@ export class FrameSource implements StreamSink {
 
   private tellLoad(header: FrameHeader, complete: boolean): void {
     this.told_ = performance.now();
-    this.bus_.fire("load.changed", { loaded: this.viewport_.loadedSamples, total: header.sampleCount, complete });
+    this.bus_.fire("load.changed", {
+      loaded: this.viewport_.loadedSamples,
+      total: header.sampleCount,
+      complete,
+    });
   }
 
   /** One frame by itself, as a response body. */

@@ -23,7 +23,10 @@ declare global {
 }
 
 /** Makes the hook: the status can be read, the camera can be read and set, and nothing else. */
-export function installHook(status: () => ViewerStatus, camera: { get(): CameraState; set(state: CameraState): void }): void {
+export function installHook(
+  status: () => ViewerStatus,
+  camera: { get(): CameraState; set(state: CameraState): void },
+): void {
   const hook: ViewerHook = Object.freeze({
     get status() {
       return Object.freeze(status());

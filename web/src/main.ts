@@ -42,7 +42,9 @@ async function main(): Promise<void> {
   }
   if (session.state === "failed") {
     state = "failed";
-    progress.fail(session.error ?? { type: "about:blank", title: "The session could not be prepared", status: 0 });
+    progress.fail(
+      session.error ?? { type: "about:blank", title: "The session could not be prepared", status: 0 },
+    );
     return;
   }
   document.title = `${session.name || "Session"} – Pointwright`;
@@ -68,7 +70,11 @@ async function main(): Promise<void> {
 }
 
 /** Waits while the session is being built; the server tells how far it is. */
-async function whenReady(client: ApiClient, id: string, show: (document: SessionDocument) => void): Promise<SessionDocument> {
+async function whenReady(
+  client: ApiClient,
+  id: string,
+  show: (document: SessionDocument) => void,
+): Promise<SessionDocument> {
   for (;;) {
     const session = await client.session(id);
     if (session.state !== "building") return session;

@@ -1,6 +1,6 @@
 import type { SessionDocument } from "./api/types";
-import type { Events } from "./events";
 import type { Notices, Questions } from "./event-map";
+import type { Events } from "./events";
 import { add, subtract, type Vec3 } from "./math/vec3";
 
 export type Bus = Events<Notices, Questions>;

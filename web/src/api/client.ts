@@ -97,10 +97,15 @@ export class ApiClient {
   }
 
   async regionOperations(id: string, region: RegionName): Promise<RegionOperation[]> {
-    return (await this.json<{ operations: RegionOperation[] }>(`v1/sessions/${id}/regions/${region}`)).operations;
+    return (await this.json<{ operations: RegionOperation[] }>(`v1/sessions/${id}/regions/${region}`))
+      .operations;
   }
 
-  addOperation(id: string, region: RegionName, operation: RegionOperation): Promise<SessionDocument & { changed: number }> {
+  addOperation(
+    id: string,
+    region: RegionName,
+    operation: RegionOperation,
+  ): Promise<SessionDocument & { changed: number }> {
     return this.send("POST", `v1/sessions/${id}/regions/${region}/operations`, operation);
   }
 
@@ -143,7 +148,10 @@ export class ApiClient {
 
   /** One key frame of a level, as bytes. */
   frame(id: string, level: number, signal: AbortSignal): Promise<Response> {
-    return this.request(`v1/sessions/${id}/samples?format=frame&level=${level}&attributes=${STREAM_ATTRIBUTES}`, { signal });
+    return this.request(
+      `v1/sessions/${id}/samples?format=frame&level=${level}&attributes=${STREAM_ATTRIBUTES}`,
+      { signal },
+    );
   }
 
   stream(id: string, signal: AbortSignal): Promise<Response> {

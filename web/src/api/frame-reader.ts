@@ -66,7 +66,11 @@ export class FrameReader {
     if (missing && this.filled_ < this.parsed_ + blockHeaderBytes) return null;
     if (missing) {
       const count = this.view_.getUint32(this.parsed_ + 4, true);
-      if (count <= header.blockSize && this.filled_ < this.parsed_ + blockRecordBytes(count, header.attributes)) return null;
+      if (
+        count <= header.blockSize &&
+        this.filled_ < this.parsed_ + blockRecordBytes(count, header.attributes)
+      )
+        return null;
     }
     const block = readBlock(this.bytes_, this.view_, this.parsed_, header);
     const repeated = header.kind === "key" ? this.seen_.has(block.number) : block.number <= this.previous_;
@@ -79,8 +83,10 @@ export class FrameReader {
   }
 
   private checkEnd(header: FrameHeader): void {
-    if (this.parsed_ !== this.bytes_.byteLength) throw new FrameError("not a frame: more bytes than the blocks fill");
-    const whole = header.kind === "key" ? this.samples_ === header.sampleCount : this.samples_ <= header.sampleCount;
+    if (this.parsed_ !== this.bytes_.byteLength)
+      throw new FrameError("not a frame: more bytes than the blocks fill");
+    const whole =
+      header.kind === "key" ? this.samples_ === header.sampleCount : this.samples_ <= header.sampleCount;
     if (!whole) throw new FrameError("not a frame: a sample count that the blocks contradict");
   }
 }

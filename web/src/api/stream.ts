@@ -1,7 +1,7 @@
-import type { ApiClient } from "./client";
-import { ByteQueue } from "./byte-queue";
 import { type FrameBlock, FrameError, type FrameHeader } from "../protocol/frames";
 import { streamRecordHeaderBytes, streamRecordTypes } from "../protocol/stream";
+import { ByteQueue } from "./byte-queue";
+import type { ApiClient } from "./client";
 import { FrameReader } from "./frame-reader";
 import type { SessionDocument } from "./types";
 

@@ -1,5 +1,5 @@
-import { type Vec3, dot, isFiniteVec3, length, normalise, scale } from "../math/vec3";
 import type { Deformation } from "../api/types";
+import { dot, isFiniteVec3, length, normalise, scale, type Vec3 } from "../math/vec3";
 
 export type Quaternion = readonly [x: number, y: number, z: number, w: number];
 
@@ -79,7 +79,11 @@ export function residual(shown: Deformation | null, wanted: Deformation | null):
   const apart = Math.sqrt(Math.max(0, dot(offset, offset) - along * along));
   const cosine = dot(from, axis);
   if (Math.abs(cosine) < 1 - 1e-9 || apart > 1e-9 * (1 + length(offset))) return null;
-  return rotation(wanted.axis.point, wanted.axis.direction, wanted.angle_deg - Math.sign(cosine) * shown.angle_deg);
+  return rotation(
+    wanted.axis.point,
+    wanted.axis.direction,
+    wanted.angle_deg - Math.sign(cosine) * shown.angle_deg,
+  );
 }
 
 /** A deformation in words, for the history and the badge. */

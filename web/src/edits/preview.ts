@@ -38,7 +38,12 @@ export class PreviewSender {
   private active_ = false;
 
   /** `firstSequence` must exceed all that were sent to the session before: the clock does. */
-  constructor(transport: PreviewTransport, listener: PreviewListener, firstSequence: number, now = () => performance.now()) {
+  constructor(
+    transport: PreviewTransport,
+    listener: PreviewListener,
+    firstSequence: number,
+    now = () => performance.now(),
+  ) {
     this.transport_ = transport;
     this.listener_ = listener;
     this.sequence_ = firstSequence;

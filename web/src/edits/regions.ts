@@ -53,7 +53,10 @@ export class RegionEditor {
     });
   }
 
-  private async change(what: string, command: () => Promise<SessionDocument | null>): Promise<SessionDocument | null> {
+  private async change(
+    what: string,
+    command: () => Promise<SessionDocument | null>,
+  ): Promise<SessionDocument | null> {
     try {
       return await this.queue_.enqueue(command);
     } catch (error) {

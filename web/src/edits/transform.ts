@@ -12,7 +12,8 @@ import { PreviewSender } from "./preview";
 function obstacleOf(session: SessionDocument): string | null {
   if (session.state !== "ready") return "The session is still being prepared.";
   const { zero, one } = session.regions;
-  if (zero.samples === 0 && one.samples === 0) return "Paint a zero-region that stays and a one-region that moves.";
+  if (zero.samples === 0 && one.samples === 0)
+    return "Paint a zero-region that stays and a one-region that moves.";
   if (zero.samples === 0) return "Paint a zero-region: what must stay in place.";
   if (one.samples === 0) return "Paint a one-region: what must move as a whole.";
   return null;
@@ -32,7 +33,13 @@ export class TransformEditor {
   private carryDetail_ = true;
   private committing_: number | null = null;
 
-  constructor(bus: Bus, client: ApiClient, queue: CommandQueue, store: SessionStore, onResidual: (d: Deformation | null) => void) {
+  constructor(
+    bus: Bus,
+    client: ApiClient,
+    queue: CommandQueue,
+    store: SessionStore,
+    onResidual: (d: Deformation | null) => void,
+  ) {
     this.bus_ = bus;
     this.client_ = client;
     this.queue_ = queue;
@@ -119,7 +126,9 @@ export class TransformEditor {
     this.pivotEditing_ = false;
     this.tell();
     this.bus_.fire("preview.changed", { state: "none", latencyMs: 0, samplesPerSecond: 0 });
-    void this.preview.cancel().catch((error: unknown) => reportError(this.bus_, error, "The preview could not be ended"));
+    void this.preview
+      .cancel()
+      .catch((error: unknown) => reportError(this.bus_, error, "The preview could not be ended"));
   }
 
   /** Records the transform; afterwards nothing is pending, or, where the server refuses, it is pending still. */

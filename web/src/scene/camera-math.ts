@@ -29,14 +29,25 @@ export const VIEWS: Record<ViewName, ViewAxes> = {
 export const VIEW_NAMES: readonly ViewName[] = ["front", "back", "left", "right", "top", "bottom"];
 
 /** How far a camera stands off so that a sphere fits the narrower side of the picture, with a margin. */
-export function framingDistance(radius: number, aspect: number, fovDeg = FIELD_OF_VIEW_DEG, margin = 1.08): number {
+export function framingDistance(
+  radius: number,
+  aspect: number,
+  fovDeg = FIELD_OF_VIEW_DEG,
+  margin = 1.08,
+): number {
   const half = (fovDeg * Math.PI) / 360;
   const narrow = aspect < 1 ? Math.atan(Math.tan(half) * aspect) : half;
   return (radius * margin) / Math.sin(narrow);
 }
 
 /** The camera that sees a sphere whole from `direction`. */
-export function frameSphere(center: Vec3, radius: number, aspect: number, direction: Vec3, up: Vec3): CameraState {
+export function frameSphere(
+  center: Vec3,
+  radius: number,
+  aspect: number,
+  direction: Vec3,
+  up: Vec3,
+): CameraState {
   const away = framingDistance(Math.max(radius, 1e-12), aspect);
   return { position: add(center, scale(normalise(direction), away)), target: center, up };
 }
@@ -67,8 +78,14 @@ export function encodeCamera(camera: CameraState): string {
 
 /** The camera of a hash value; null where it is not nine finite numbers that make a camera. */
 export function decodeCamera(text: string): CameraState | null {
-  const vectors = text.split(";").map((part) => part.split(",").map((number) => (number.trim() === "" ? Number.NaN : Number(number))));
-  if (vectors.length !== 3 || vectors.some((v) => v.length !== 3 || v.some((value) => !Number.isFinite(value)))) return null;
+  const vectors = text
+    .split(";")
+    .map((part) => part.split(",").map((number) => (number.trim() === "" ? Number.NaN : Number(number))));
+  if (
+    vectors.length !== 3 ||
+    vectors.some((v) => v.length !== 3 || v.some((value) => !Number.isFinite(value)))
+  )
+    return null;
   const [position, target, up] = vectors as unknown as [Vec3, Vec3, Vec3];
   const towards = subtract(target, position);
   const side = cross(towards, up);

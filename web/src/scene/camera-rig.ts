@@ -1,7 +1,14 @@
 import { MOUSE, PerspectiveCamera, TOUCH, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Vec3 } from "../math/vec3";
-import { type CameraState, clipPlanes, FIELD_OF_VIEW_DEG, frameSphere, VIEWS, type ViewName } from "./camera-math";
+import {
+  type CameraState,
+  clipPlanes,
+  FIELD_OF_VIEW_DEG,
+  frameSphere,
+  VIEWS,
+  type ViewName,
+} from "./camera-math";
 
 export type UpAxis = "y" | "z";
 
@@ -74,17 +81,23 @@ export class CameraRig {
   /** Frames the whole object, or a sphere of it, from where the camera looks now. */
   frame(center: Vec3 = this.center_, radius = this.radius_): void {
     const direction = this.camera.position.clone().sub(this.controls_.target);
-    this.setState(frameSphere(center, radius, this.camera.aspect, direction.toArray(), this.camera.up.toArray()));
+    this.setState(
+      frameSphere(center, radius, this.camera.aspect, direction.toArray(), this.camera.up.toArray()),
+    );
   }
 
   home(): void {
     const direction = oriented(DEFAULT_DIRECTION, this.up_);
-    this.setState(frameSphere(this.center_, this.radius_, this.camera.aspect, direction, this.camera.up.toArray()));
+    this.setState(
+      frameSphere(this.center_, this.radius_, this.camera.aspect, direction, this.camera.up.toArray()),
+    );
   }
 
   view(name: ViewName): void {
     const direction = oriented(VIEWS[name].direction, this.up_);
-    this.setState(frameSphere(this.center_, this.radius_, this.camera.aspect, direction, this.camera.up.toArray()));
+    this.setState(
+      frameSphere(this.center_, this.radius_, this.camera.aspect, direction, this.camera.up.toArray()),
+    );
   }
 
   setUp(up: UpAxis): void {

@@ -78,7 +78,12 @@ export class Pacer {
     } else {
       this.index_ += 1;
     }
-    return { kind: "picture", budget: Number.POSITIVE_INFINITY, index: this.index_, jitter: jitterOf(this.index_) };
+    return {
+      kind: "picture",
+      budget: Number.POSITIVE_INFINITY,
+      index: this.index_,
+      jitter: jitterOf(this.index_),
+    };
   }
 
   /** Milliseconds until the next tick is due: 0 at the next frame, null where nothing is left to do. */

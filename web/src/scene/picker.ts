@@ -55,8 +55,10 @@ export class Picker {
     this.read(this.attributes_, 1, px, py, 1, this.normal_);
     const camera = this.camera_;
     const projection = camera.projectionMatrix.elements;
-    const viewX = ((((px + 0.5) / width) * 2 - 1 + (projection[8] ?? 0)) / (projection[0] ?? 1)) * found.depth;
-    const viewY = ((((py + 0.5) / height) * 2 - 1 + (projection[9] ?? 0)) / (projection[5] ?? 1)) * found.depth;
+    const viewX =
+      ((((px + 0.5) / width) * 2 - 1 + (projection[8] ?? 0)) / (projection[0] ?? 1)) * found.depth;
+    const viewY =
+      ((((py + 0.5) / height) * 2 - 1 + (projection[9] ?? 0)) / (projection[5] ?? 1)) * found.depth;
     const at = new Vector3(viewX, viewY, -found.depth);
     const towards = at.clone().negate().normalize();
     const normal = new Vector3(this.normal_[0], this.normal_[1], this.normal_[2]);
@@ -87,7 +89,14 @@ export class Picker {
     return best;
   }
 
-  private read(target: WebGLRenderTarget, texture: number, x: number, y: number, side: number, into: Float32Array): void {
+  private read(
+    target: WebGLRenderTarget,
+    texture: number,
+    x: number,
+    y: number,
+    side: number,
+    into: Float32Array,
+  ): void {
     const gl = this.renderer_.getContext() as WebGL2RenderingContext;
     this.renderer_.setRenderTarget(target);
     gl.readBuffer(gl.COLOR_ATTACHMENT0 + texture);

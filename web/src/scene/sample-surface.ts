@@ -1,4 +1,13 @@
-import { type BufferAttribute, BufferGeometry, DataTexture, FloatType, GLBufferAttribute, NearestFilter, RGBAFormat, Sphere } from "three";
+import {
+  type BufferAttribute,
+  BufferGeometry,
+  DataTexture,
+  FloatType,
+  GLBufferAttribute,
+  NearestFilter,
+  RGBAFormat,
+  Sphere,
+} from "three";
 import { type LayerPrefix, layerPrefixes } from "./layers";
 
 /** What the surface needs to know of a frame before its blocks come. */

@@ -1,6 +1,7 @@
 import { type PerspectiveCamera, Vector3 } from "three";
 import type { Vec3 } from "../math/vec3";
 import type { Passes } from "./passes";
+import { setUniform, vectorUniform } from "./uniforms";
 
 interface Segment {
   from: Vec3;
@@ -28,13 +29,13 @@ export class StrokeMask {
   begin(color: readonly [number, number, number]): void {
     this.segments_.length = 0;
     this.until_ = null;
-    this.passes_.set(this.passes_.present, "maskColor", new Vector3(...color));
+    vectorUniform(this.passes_.uniforms.present, "maskColor").set(...color);
   }
 
   add(from: Vec3, to: Vec3, radius: number): void {
     this.segments_.push({ from, to, radius });
     if (this.camera_) this.draw(this.camera_, this.segments_.length - 1);
-    this.passes_.set(this.passes_.present, "showMask", true);
+    setUniform(this.passes_.uniforms.present, "showMask", true);
     this.changed_();
   }
 
@@ -52,7 +53,7 @@ export class StrokeMask {
   clear(): void {
     this.segments_.length = 0;
     this.until_ = null;
-    this.passes_.set(this.passes_.present, "showMask", false);
+    setUniform(this.passes_.uniforms.present, "showMask", false);
     this.changed_();
   }
 

@@ -1,15 +1,16 @@
-import { Scene, Vector3, WebGLRenderer } from "three";
+import { Scene, WebGLRenderer } from "three";
 import type { Deformation } from "../api/types";
-import { normalise, type Vec3 } from "../math/vec3";
+import type { Vec3 } from "../math/vec3";
 import { CameraRig } from "./camera-rig";
 import { DEFAULT_DISPLAY, type DisplaySettings } from "./display";
 import { prefixWithin } from "./layers";
-import { Passes } from "./passes";
 import { Pacer } from "./pacer";
+import { Passes } from "./passes";
 import { type Hit, Picker } from "./picker";
-import { SampleSurface, type SurfaceBlock, type SurfaceLayout } from "./sample-surface";
 import { type RegionCentres, regionCentres } from "./region-centres";
+import { SampleSurface, type SurfaceBlock, type SurfaceLayout } from "./sample-surface";
 import { StrokeMask } from "./stroke-mask";
+import { setResidual, setUniform, vectorUniform } from "./uniforms";
 
 /** Pixels that the targets hold at most; beyond, the picture is drawn at a lower ratio and scaled up. */
 const MAX_PIXELS = 8_500_000;
@@ -18,6 +19,15 @@ export interface BrushRing {
   position: Vec3;
   radius: number;
   color: readonly [number, number, number];
+}
+
+/** Whether the browser draws without a graphics card: then the handles' edges are not worth four samples a pixel. */
+function isSoftware(): boolean {
+  const context = document
+    .createElement("canvas")
+    .getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return context === null;
 }
 
 /** The picture: owns the canvas, the samples on the GPU and the loop that draws them when something has changed. */
@@ -48,18 +58,30 @@ export class Viewport {
 
   constructor(container: HTMLElement) {
     this.container_ = container;
-    this.renderer_ = new WebGLRenderer({ antialias: true, alpha: false, powerPreference: "high-performance" });
+    this.renderer_ = new WebGLRenderer({
+      antialias: !isSoftware(),
+      alpha: false,
+      powerPreference: "high-performance",
+    });
     this.renderer_.autoClear = false;
     this.canvas = this.renderer_.domElement;
     this.canvas.className = "viewport-canvas";
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute("role", "application");
-    this.canvas.setAttribute("aria-label", "View of the surface. Arrow keys turn it, plus and minus zoom, F frames it.");
+    this.canvas.setAttribute(
+      "aria-label",
+      "View of the surface. Arrow keys turn it, plus and minus zoom, F frames it.",
+    );
     container.append(this.canvas);
     const gl = this.gl;
-    if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("This browser's WebGL 2 cannot draw into float textures.");
+    if (!gl.getExtension("EXT_color_buffer_float"))
+      throw new Error("This browser's WebGL 2 cannot draw into float textures.");
     this.passes_ = new Passes(this.renderer_);
-    this.passes_.set(this.passes_.splat, "maxPointSize", (gl.getParameter(gl.ALIASED_POINT_SIZE_RANGE) as Float32Array)[1] ?? 64);
+    setUniform(
+      this.passes_.uniforms.splat,
+      "maxPointSize",
+      (gl.getParameter(gl.ALIASED_POINT_SIZE_RANGE) as Float32Array)[1] ?? 64,
+    );
     this.rig = new CameraRig(this.canvas, () => this.invalidate());
     this.picker_ = new Picker(this.renderer_, this.passes_.surfaceTarget, this.passes_.attributeTarget);
     this.mask = new StrokeMask(this.passes_, () => this.invalidateOverlay());
@@ -77,7 +99,13 @@ export class Viewport {
 
   /** Nothing waits to be drawn or refined. */
   get idle(): boolean {
-    return !this.contextLost_ && this.fence_ === null && this.frame_ === 0 && this.timer_ === 0 && this.pacer_.settled;
+    return (
+      !this.contextLost_ &&
+      this.fence_ === null &&
+      this.frame_ === 0 &&
+      this.timer_ === 0 &&
+      this.pacer_.settled
+    );
   }
 
   get loadedSamples(): number {
@@ -103,7 +131,7 @@ export class Viewport {
 
   /** Makes room for a frame's blocks, or keeps the buffers where they fit. */
   beginFrame(layout: SurfaceLayout, key: boolean): void {
-    if (this.surface_ && this.surface_.fits(layout)) return;
+    if (this.surface_?.fits(layout)) return;
     if (!key) return;
     this.surface_?.dispose();
     this.surface_ = new SampleSurface(this.gl, layout);
@@ -120,8 +148,8 @@ export class Viewport {
 
   setBounds(center: Vec3, radius: number, stretchRange: number): void {
     this.rig.setBounds(center, radius);
-    this.passes_.set(this.passes_.shade, "objectRadius", Math.max(radius, 1e-12));
-    this.passes_.set(this.passes_.splat, "stretchRange", stretchRange);
+    setUniform(this.passes_.uniforms.shade, "objectRadius", Math.max(radius, 1e-12));
+    setUniform(this.passes_.uniforms.splat, "stretchRange", stretchRange);
   }
 
   clearSurface(): void {
@@ -132,28 +160,17 @@ export class Viewport {
 
   /** The deformation that the picture adds to the server's last frame, in scene coordinates. */
   setResidual(deformation: Deformation | null): void {
-    const { splat } = this.passes_;
-    const kind = deformation ? (deformation.type === "translation" ? 1 : 2) : 0;
-    if (kind === 0 && splat["residualKind"]?.value === 0) return;
-    this.passes_.set(splat, "residualKind", kind);
-    if (deformation?.type === "translation") {
-      (splat["residualVector"]?.value as Vector3).set(...deformation.vector);
-    } else if (deformation) {
-      (splat["residualVector"]?.value as Vector3).set(...normalise(deformation.axis.direction));
-      (splat["residualPoint"]?.value as Vector3).set(...deformation.axis.point);
-      this.passes_.set(splat, "residualAngle", (deformation.angle_deg * Math.PI) / 180);
-    }
-    this.invalidate();
+    if (setResidual(this.passes_.uniforms.splat, deformation)) this.invalidate();
   }
 
   setRing(ring: BrushRing | null): void {
-    const { present } = this.passes_;
+    const { present } = this.passes_.uniforms;
     if (!ring && !present["showRing"]?.value) return;
-    this.passes_.set(present, "showRing", ring !== null);
+    setUniform(present, "showRing", ring !== null);
     if (ring) {
-      (present["ringCenter"]?.value as Vector3).copy(this.picker_.toView(ring.position));
-      this.passes_.set(present, "ringRadius", ring.radius);
-      (present["ringColor"]?.value as Vector3).set(...ring.color);
+      vectorUniform(present, "ringCenter").copy(this.picker_.toView(ring.position));
+      setUniform(present, "ringRadius", ring.radius);
+      vectorUniform(present, "ringColor").set(...ring.color);
     }
     this.invalidateOverlay();
   }
@@ -212,7 +229,11 @@ export class Viewport {
     this.onDrawn?.();
     const wait = this.pacer_.wait(performance.now());
     if (wait === 0 || this.fence_) this.schedule();
-    else if (wait !== null) this.timer_ = window.setTimeout(() => { this.timer_ = 0; this.schedule(); }, wait);
+    else if (wait !== null)
+      this.timer_ = window.setTimeout(() => {
+        this.timer_ = 0;
+        this.schedule();
+      }, wait);
   };
 
   private pictureFinished(now: number): boolean {
@@ -228,16 +249,16 @@ export class Viewport {
   private drawPicture(budget: number, index: number, jitter: readonly [number, number], now: number): void {
     const { camera } = this.rig;
     const { x: width, y: height } = this.passes_.viewport;
-    const { splat, shade } = this.passes_;
+    const { splat, shade } = this.passes_.uniforms;
     const surface = this.surface_;
     const prefix = surface ? prefixWithin(surface.prefixes, budget) : { blocks: 0, samples: 0 };
     // Fewer samples stand wider apart: their discs grow so that the surface stays closed.
     const shown = surface ? Math.max(1, Math.min(prefix.samples, Math.max(surface.loadedSamples, 1))) : 1;
     const sparse = Math.sqrt(Math.max(1, this.fullSamples_) / shown);
-    this.passes_.set(splat, "splatRadius", this.spacing_ * 1.05 * Math.max(1, sparse) * this.display_.splatSize);
-    this.passes_.set(shade, "turn", index * 0.61);
+    setUniform(splat, "splatRadius", this.spacing_ * 1.2 * Math.max(1, sparse) * this.display_.splatSize);
+    setUniform(shade, "turn", index * 0.61);
     camera.setViewOffset(width, height, jitter[0], jitter[1], width, height);
-    this.passes_.set(splat, "pixelScale", height * 0.5 * camera.projectionMatrix.elements[5]);
+    setUniform(splat, "pixelScale", height * 0.5 * camera.projectionMatrix.elements[5]);
     this.passes_.drawPicture(camera, prefix.blocks * (surface?.layout.blockSize ?? 0), 1 / (index + 1));
     camera.clearViewOffset();
     this.picker_.setCamera(camera);

@@ -1,12 +1,12 @@
-import type { RegionName, RegionOperation, SessionDocument } from "../api/types";
+import type { RegionName, SessionDocument } from "../api/types";
 import type { RegionEditor } from "../edits/regions";
 import type { ToolName } from "../event-map";
 import { add, normalise, type Vec3 } from "../math/vec3";
-import { ONE_COLOR, ZERO_COLOR } from "../scene/passes";
 import type { Hit } from "../scene/picker";
+import { ONE_COLOR, ZERO_COLOR } from "../scene/region-colors";
 import type { Viewport } from "../scene/viewport";
 import type { SessionStore } from "../session-store";
-import { isDepthJump, isNewVertex, simplifyStroke } from "./stroke";
+import { isDepthJump, isNewVertex, strokeOperation } from "./stroke";
 import type { Tool } from "./tool";
 
 export type BrushKind = "zero" | "one" | "erase";
@@ -14,8 +14,6 @@ export type BrushKind = "zero" | "one" | "erase";
 type Color = readonly [number, number, number];
 const ERASER_COLOR: Color = [0.86, 0.87, 0.9];
 const COLORS: Record<BrushKind, Color> = { zero: ZERO_COLOR, one: ONE_COLOR, erase: ERASER_COLOR };
-/** Of the radius: what a stroke may be simplified by. */
-const TOLERANCE = 0.06;
 const BARE_COLOR: Color = [0.66, 0.64, 0.6];
 
 /** The brush's radius, shared by the three brushes, in model units. */
@@ -45,7 +43,13 @@ export class BrushTool implements Tool {
   private frame_ = 0;
   private strokes_ = 0;
 
-  constructor(kind: BrushKind, viewport: Viewport, store: SessionStore, regions: RegionEditor, size: BrushSize) {
+  constructor(
+    kind: BrushKind,
+    viewport: Viewport,
+    store: SessionStore,
+    regions: RegionEditor,
+    size: BrushSize,
+  ) {
     this.name = kind;
     this.kind_ = kind;
     this.viewport_ = viewport;
@@ -94,7 +98,13 @@ export class BrushTool implements Tool {
     this.viewport_.canvas.focus({ preventScroll: true });
     this.viewport_.canvas.setPointerCapture(event.pointerId);
     const kind = event.shiftKey ? "erase" : this.kind_;
-    this.stroke_ = { pointer: event.pointerId, kind, parts: [[hit.position]], last: hit, towardsCamera: hit.towardsCamera };
+    this.stroke_ = {
+      pointer: event.pointerId,
+      kind,
+      parts: [[hit.position]],
+      last: hit,
+      towardsCamera: hit.towardsCamera,
+    };
     this.viewport_.rig.setEnabled(false);
     this.viewport_.mask.begin(kind === "erase" ? BARE_COLOR : COLORS[kind]);
     this.viewport_.mask.add(hit.position, hit.position, this.size_.radius);
@@ -166,8 +176,17 @@ export class BrushTool implements Tool {
   private send(stroke: Stroke): Promise<SessionDocument | null> {
     const facing = normalise(stroke.towardsCamera);
     const erasing = stroke.kind === "erase";
-    const operations = stroke.parts.map((part) => strokeOperation(part.map((p) => this.store_.toModel(p)), this.size_.radius, facing, erasing));
-    return erasing ? this.regions_.erase(operations) : this.regions_.paint(stroke.kind as RegionName, operations);
+    const operations = stroke.parts.map((part) =>
+      strokeOperation(
+        part.map((p) => this.store_.toModel(p)),
+        this.size_.radius,
+        facing,
+        erasing,
+      ),
+    );
+    return erasing
+      ? this.regions_.erase(operations)
+      : this.regions_.paint(stroke.kind as RegionName, operations);
   }
 
   private scheduleRing(): void {
@@ -185,15 +204,4 @@ export class BrushTool implements Tool {
   private showRing(hit: Hit, kind: BrushKind): void {
     this.viewport_.setRing({ position: hit.position, radius: this.size_.radius, color: COLORS[kind] });
   }
-}
-
-/** A part of a stroke as the server takes it; a single touch is a sphere. */
-export function strokeOperation(vertices: readonly Vec3[], radius: number, facing: Vec3, erase: boolean): RegionOperation {
-  const simple = simplifyStroke(vertices, TOLERANCE * radius);
-  const [first] = simple;
-  const shape =
-    simple.length === 1 && first
-      ? ({ type: "sphere", center: first, radius } as const)
-      : ({ type: "stroke", vertices: simple, radius } as const);
-  return erase ? { mode: "remove", shape, facing } : { mode: "add", shape, facing, steal: true };
 }

@@ -1,4 +1,8 @@
+import type { RegionOperation } from "../api/types";
 import { distance, distanceToSegment, type Vec3 } from "../math/vec3";
+
+/** Of the radius: what a stroke may be simplified by. */
+const TOLERANCE = 0.06;
 
 /**
  * The vertices of a stroke without those that lie within `tolerance` of the line through the rest (Douglas and Peucker).
@@ -35,7 +39,13 @@ export function simplifyStroke(vertices: readonly Vec3[], tolerance: number): Ve
 }
 
 /** Whether a stroke that went from `from` to `to` jumped across a gap in depth, and so begins anew at `to`. */
-export function isDepthJump(from: Vec3, to: Vec3, depthFrom: number, depthTo: number, radius: number): boolean {
+export function isDepthJump(
+  from: Vec3,
+  to: Vec3,
+  depthFrom: number,
+  depthTo: number,
+  radius: number,
+): boolean {
   return Math.abs(depthFrom - depthTo) > 1.5 * radius && distance(from, to) > 2 * radius;
 }
 
@@ -49,4 +59,20 @@ export const BRUSH_STEP = 1.15;
 /** A brush radius after `steps` presses of a key or notches of a wheel, within sensible parts of the object. */
 export function steppedRadius(radius: number, steps: number, diagonal: number): number {
   return Math.min(0.5 * diagonal, Math.max(5e-4 * diagonal, radius * BRUSH_STEP ** steps));
+}
+
+/** A part of a stroke as the server takes it; a single touch is a sphere. */
+export function strokeOperation(
+  vertices: readonly Vec3[],
+  radius: number,
+  facing: Vec3,
+  erase: boolean,
+): RegionOperation {
+  const simple = simplifyStroke(vertices, TOLERANCE * radius);
+  const [first] = simple;
+  const shape =
+    simple.length === 1 && first
+      ? ({ type: "sphere", center: first, radius } as const)
+      : ({ type: "stroke", vertices: simple, radius } as const);
+  return erase ? { mode: "remove", shape, facing } : { mode: "add", shape, facing, steal: true };
 }

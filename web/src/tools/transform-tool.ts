@@ -1,4 +1,4 @@
-import { axisAngleOf, type AxisAngle, rotation, translation } from "../edits/deformation";
+import { type AxisAngle, axisAngleOf, rotation, translation } from "../edits/deformation";
 import type { TransformEditor } from "../edits/transform";
 import type { TransformState } from "../event-map";
 import { add, subtract, type Vec3 } from "../math/vec3";
@@ -30,7 +30,14 @@ export class TransformTool implements Tool {
   private axisAngle_: AxisAngle | undefined;
   private active_ = false;
 
-  constructor(name: "move" | "rotate", bus: Bus, viewport: Viewport, gizmo: Gizmo, store: SessionStore, editor: TransformEditor) {
+  constructor(
+    name: "move" | "rotate",
+    bus: Bus,
+    viewport: Viewport,
+    gizmo: Gizmo,
+    store: SessionStore,
+    editor: TransformEditor,
+  ) {
     this.name = name;
     this.bus_ = bus;
     this.viewport_ = viewport;
@@ -81,7 +88,9 @@ export class TransformTool implements Tool {
       this.editor_.set(translation(subtract(position, pivot)));
     } else {
       const previous: AxisAngle | undefined =
-        deformation?.type === "rotation" ? { direction: deformation.axis.direction, angleDeg: deformation.angle_deg } : undefined;
+        deformation?.type === "rotation"
+          ? { direction: deformation.axis.direction, angleDeg: deformation.angle_deg }
+          : undefined;
       this.axisAngle_ = axisAngleOf(pose.quaternion, previous);
       this.editor_.set(rotation(pivot, this.axisAngle_.direction, this.axisAngle_.angleDeg));
     }
@@ -103,11 +112,14 @@ export class TransformTool implements Tool {
   private poseOf(state: TransformState): GizmoPose {
     const { deformation } = state;
     let position: Vec3 = state.pivot;
-    if (deformation?.type === "translation" && !state.pivotEditing) position = add(position, deformation.vector);
+    if (deformation?.type === "translation" && !state.pivotEditing)
+      position = add(position, deformation.vector);
     const turned = deformation?.type === "rotation" && !state.pivotEditing;
     return {
       position: this.store_.toScene(position),
-      quaternion: turned ? quaternionOf({ direction: deformation.axis.direction, angleDeg: deformation.angle_deg }) : IDENTITY,
+      quaternion: turned
+        ? quaternionOf({ direction: deformation.axis.direction, angleDeg: deformation.angle_deg })
+        : IDENTITY,
     };
   }
 

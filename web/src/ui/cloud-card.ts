@@ -34,11 +34,18 @@ export function createCloudCard(options: CloudCardOptions): HTMLElement {
     h(
       "div",
       { class: "cloud-head" },
-      h("div", { class: "cloud-text" }, h("h3", {}, cloud.name), h("p", { class: "facts" }, facts.filter(Boolean).join(" · ")), notes && h("p", { class: "facts note" }, notes)),
+      h(
+        "div",
+        { class: "cloud-text" },
+        h("h3", {}, cloud.name),
+        h("p", { class: "facts" }, facts.filter(Boolean).join(" · ")),
+        notes && h("p", { class: "facts note" }, notes),
+      ),
       startForm(options),
       confirmButton(`Delete ${cloud.name}`, () => void options.removeCloud()),
     ),
-    sessions.length > 0 && h("ul", { class: "session-list" }, ...sessions.map((session) => sessionRow(session, options))),
+    sessions.length > 0 &&
+      h("ul", { class: "session-list" }, ...sessions.map((session) => sessionRow(session, options))),
   );
 }
 
@@ -55,7 +62,12 @@ function importNotes(cloud: CloudDocument): string {
 
 function startForm(options: CloudCardOptions): HTMLElement {
   const scale = numberField("Base scale", DEFAULT_SCALE_PERCENT, { unit: "% of the diagonal" });
-  const button = h("button", { type: "submit", class: "button primary", aria: { label: `New session of ${options.cloud.name}` } }, icon("plus"), "New session");
+  const button = h(
+    "button",
+    { type: "submit", class: "button primary", aria: { label: `New session of ${options.cloud.name}` } },
+    icon("plus"),
+    "New session",
+  );
   const form = h(
     "form",
     {
@@ -96,7 +108,10 @@ function sessionRow(session: SessionSummary, options: CloudCardOptions): HTMLEle
       h("span", {}, session.name || options.cloud.name),
       h("small", {}, `${state} · ${formatAge(session.created)}`),
     ),
-    confirmButton(`Delete the session of ${formatAge(session.created)}`, () => void options.removeSession(session.id)),
+    confirmButton(
+      `Delete the session of ${formatAge(session.created)}`,
+      () => void options.removeSession(session.id),
+    ),
   );
 }
 
@@ -104,7 +119,11 @@ const CONFIRM_MS = 3000;
 
 /** Deletes at the second press: the first only asks. */
 function confirmButton(label: string, action: () => void): HTMLElement {
-  const button = h("button", { type: "button", class: "icon-button small delete", title: label, aria: { label } }, icon("trash"));
+  const button = h(
+    "button",
+    { type: "button", class: "icon-button small delete", title: label, aria: { label } },
+    icon("trash"),
+  );
   let armed = 0;
   button.addEventListener("click", () => {
     if (armed !== 0) {

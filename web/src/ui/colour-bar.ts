@@ -25,7 +25,10 @@ export function createColourBar(bus: Bus, first: DisplaySettings): HTMLElement {
     setText(title, isDetail ? "Detail, model units" : "Scale parameter t");
     const labels = isDetail ? [formatScalar(-range), "0", formatScalar(range)] : ["0", "0.5", "1"];
     replaceChildren(ticks, ...labels.map((label) => h("span", {}, label)));
-    bar.setAttribute("aria-label", `Colours: ${isDetail ? "detail" : "scale parameter t"} from ${labels[0]} to ${labels[2]}`);
+    bar.setAttribute(
+      "aria-label",
+      `Colours: ${isDetail ? "detail" : "scale parameter t"} from ${labels[0]} to ${labels[2]}`,
+    );
   };
   bus.on("display.changed", (next) => {
     settings = next;

@@ -13,7 +13,11 @@ export interface DisplayPanelOptions {
 }
 
 /** What is shown and how. */
-export function createDisplayPanel(bus: Bus, session: SessionDocument, options: DisplayPanelOptions): HTMLElement {
+export function createDisplayPanel(
+  bus: Bus,
+  session: SessionDocument,
+  options: DisplayPanelOptions,
+): HTMLElement {
   const section = createSection("Display");
   let settings = options.settings;
   const change = (part: Partial<DisplaySettings>): void => {
@@ -22,24 +26,49 @@ export function createDisplayPanel(bus: Bus, session: SessionDocument, options: 
   };
   const mode = selectField<DisplayMode>(
     "Show",
-    [["shaded", "Shaded"], ["color", "Colours"], ["normals", "Normals"], ["t", "Scale t"], ["detail", "Signed detail"]],
+    [
+      ["shaded", "Shaded"],
+      ["color", "Colours"],
+      ["normals", "Normals"],
+      ["t", "Scale t"],
+      ["detail", "Signed detail"],
+    ],
     settings.mode,
     (value) => change({ mode: value }),
   );
   const levels = [
     ["full", "Full surface"] as const,
-    ...session.levels.slice(0, -1).map((level) => [String(level.level), `Base, level ${level.level}`] as const),
+    ...session.levels
+      .slice(0, -1)
+      .map((level) => [String(level.level), `Base, level ${level.level}`] as const),
   ];
-  const level = selectField<string>("Level", levels, settings.level === null ? "full" : String(settings.level), (value) =>
-    change({ level: value === "full" ? null : Number(value) }),
+  const level = selectField<string>(
+    "Level",
+    levels,
+    settings.level === null ? "full" : String(settings.level),
+    (value) => change({ level: value === "full" ? null : Number(value) }),
   );
-  const size = rangeField("Splat size", { min: 0.4, max: 2.5, step: 0.05 }, settings.splatSize, (value) => `${Math.round(value * 100)} %`, (splatSize) =>
-    change({ splatSize }),
+  const size = rangeField(
+    "Splat size",
+    { min: 0.4, max: 2.5, step: 0.05 },
+    settings.splatSize,
+    (value) => `${Math.round(value * 100)} %`,
+    (splatSize) => change({ splatSize }),
   );
-  const up = selectField("Up axis", [["y", "Y"], ["z", "Z"]], options.up, options.onUp);
+  const up = selectField(
+    "Up axis",
+    [
+      ["y", "Y"],
+      ["z", "Z"],
+    ],
+    options.up,
+    options.onUp,
+  );
   const tint = checkField("Tint the regions", settings.tintRegions, (tintRegions) => change({ tintRegions }));
   const cues = checkField("Depth cues", settings.depthCues, (depthCues) => change({ depthCues }));
-  const safe = checkField("Colour-blind-safe maps", settings.colorBlindSafe, (colorBlindSafe) => change({ colorBlindSafe }));
+  const safe = checkField("Colour-blind-safe maps", settings.colorBlindSafe, (colorBlindSafe) =>
+    change({ colorBlindSafe }),
+  );
   append(section.body, [
     h("div", { class: "field-row" }, mode.element, level.element),
     size.element,
@@ -74,7 +103,10 @@ export function loadDisplay(): DisplaySettings {
       ...DEFAULT_DISPLAY,
       colorBlindSafe: kept.colorBlindSafe === true,
       depthCues: kept.depthCues !== false,
-      splatSize: typeof kept.splatSize === "number" && kept.splatSize >= 0.4 && kept.splatSize <= 2.5 ? kept.splatSize : 1,
+      splatSize:
+        typeof kept.splatSize === "number" && kept.splatSize >= 0.4 && kept.splatSize <= 2.5
+          ? kept.splatSize
+          : 1,
     };
   } catch {
     return DEFAULT_DISPLAY;

@@ -1,6 +1,8 @@
 type Child = Node | string | null | undefined | false;
 
-type Listeners = { [Name in keyof HTMLElementEventMap as `on${Name}`]?: (event: HTMLElementEventMap[Name]) => void };
+type Listeners = {
+  [Name in keyof HTMLElementEventMap as `on${Name}`]?: (event: HTMLElementEventMap[Name]) => void;
+};
 
 export type Props<Tag extends keyof HTMLElementTagNameMap> = Listeners & {
   class?: string;
@@ -22,7 +24,8 @@ export function h<Tag extends keyof HTMLElementTagNameMap>(
     else if (name === "data") Object.assign(element.dataset, value);
     else if (name === "role") element.setAttribute("role", value as string);
     else if (name === "aria") {
-      for (const [key, text] of Object.entries(value as Record<string, string>)) element.setAttribute(`aria-${key}`, text);
+      for (const [key, text] of Object.entries(value as Record<string, string>))
+        element.setAttribute(`aria-${key}`, text);
     } else if (name.startsWith("on")) element.addEventListener(name.slice(2), value as EventListener);
     else (element as unknown as Record<string, unknown>)[name] = value;
   }
@@ -32,7 +35,8 @@ export function h<Tag extends keyof HTMLElementTagNameMap>(
 
 export function append(parent: Node, children: readonly Child[]): void {
   for (const child of children) {
-    if (child !== null && child !== undefined && child !== false) parent.appendChild(typeof child === "string" ? document.createTextNode(child) : child);
+    if (child !== null && child !== undefined && child !== false)
+      parent.appendChild(typeof child === "string" ? document.createTextNode(child) : child);
   }
 }
 

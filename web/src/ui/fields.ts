@@ -22,7 +22,15 @@ function roundForShow(value: number): string {
 
 export function numberField(label: string, value: number, options: NumberOptions = {}): NumberField {
   const id = freshId();
-  const input = h("input", { id, type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false, class: "number", value: roundForShow(value) });
+  const input = h("input", {
+    id,
+    type: "text",
+    inputMode: "decimal",
+    autocomplete: "off",
+    spellcheck: false,
+    class: "number",
+    value: roundForShow(value),
+  });
   let current = value;
   input.addEventListener("input", () => {
     const text = input.value.trim().replace(",", ".");
@@ -37,7 +45,12 @@ export function numberField(label: string, value: number, options: NumberOptions
     options.onEnter?.();
   });
   const unit = options.unit ? h("span", { class: "unit" }, options.unit) : null;
-  const element = h("div", { class: "field" }, h("label", { htmlFor: id }, label), h("div", { class: "input-box" }, input, unit));
+  const element = h(
+    "div",
+    { class: "field" },
+    h("label", { htmlFor: id }, label),
+    h("div", { class: "input-box" }, input, unit),
+  );
   return {
     element,
     input,
@@ -64,7 +77,12 @@ export interface VectorField {
 export function vectorField(name: string, value: Vec3, options: NumberOptions = {}): VectorField {
   const make = (axis: string, index: 0 | 1 | 2): NumberField => numberField(axis, value[index], options);
   const fields = [make("X", 0), make("Y", 1), make("Z", 2)] as const;
-  const element = h("fieldset", { class: "vector" }, h("legend", {}, name), ...fields.map((field) => field.element));
+  const element = h(
+    "fieldset",
+    { class: "vector" },
+    h("legend", {}, name),
+    ...fields.map((field) => field.element),
+  );
   fields.forEach((field, index) => {
     field.element.classList.add("axis", `axis-${"xyz"[index]}`);
     field.input.setAttribute("aria-label", `${name} ${"XYZ"[index]}`);
@@ -90,14 +108,36 @@ export function selectField<Value extends string>(
   onChange: (value: Value) => void,
 ): { element: HTMLElement; select: HTMLSelectElement } {
   const id = freshId();
-  const select = h("select", { id, onchange: () => onChange(select.value as Value) }, ...choices.map(([key, text]) => h("option", { value: key }, text)));
+  const select = h(
+    "select",
+    { id, onchange: () => onChange(select.value as Value) },
+    ...choices.map(([key, text]) => h("option", { value: key }, text)),
+  );
   select.value = value;
-  return { element: h("div", { class: "field" }, h("label", { htmlFor: id }, label), h("div", { class: "input-box select-box" }, select)), select };
+  return {
+    element: h(
+      "div",
+      { class: "field" },
+      h("label", { htmlFor: id }, label),
+      h("div", { class: "input-box select-box" }, select),
+    ),
+    select,
+  };
 }
 
-export function checkField(label: string, checked: boolean, onChange: (checked: boolean) => void): { element: HTMLElement; input: HTMLInputElement } {
+export function checkField(
+  label: string,
+  checked: boolean,
+  onChange: (checked: boolean) => void,
+): { element: HTMLElement; input: HTMLInputElement } {
   const id = freshId();
-  const input = h("input", { id, type: "checkbox", checked, class: "switch", onchange: () => onChange(input.checked) });
+  const input = h("input", {
+    id,
+    type: "checkbox",
+    checked,
+    class: "switch",
+    onchange: () => onChange(input.checked),
+  });
   return { element: h("div", { class: "field check" }, h("label", { htmlFor: id }, label), input), input };
 }
 
@@ -110,7 +150,14 @@ export function rangeField(
 ): { element: HTMLElement; input: HTMLInputElement; set(value: number): void } {
   const id = freshId();
   const output = h("output", { class: "range-value" }, format(value));
-  const input = h("input", { id, type: "range", min: String(range.min), max: String(range.max), step: String(range.step), value: String(value) });
+  const input = h("input", {
+    id,
+    type: "range",
+    min: String(range.min),
+    max: String(range.max),
+    step: String(range.step),
+    value: String(value),
+  });
   const show = (next: number): void => {
     output.textContent = format(next);
     input.setAttribute("aria-valuetext", format(next));

@@ -16,16 +16,24 @@ export function createHistoryPanel(bus: Bus): HTMLElement {
     const state = edit === head ? "current" : edit > head ? "undone" : "done";
     const button = h(
       "button",
-      { type: "button", class: `history-entry ${state}`, data: { edit: String(edit) }, onclick: () => void bus.invoke("edit.jump", edit) },
+      {
+        type: "button",
+        class: `history-entry ${state}`,
+        data: { edit: String(edit) },
+        onclick: () => void bus.invoke("edit.jump", edit),
+      },
       h("span", { class: "history-mark" }, edit === head ? icon("check") : null),
       h("span", { class: "history-text" }, label, h("small", {}, detail)),
     );
     if (edit === head) button.setAttribute("aria-current", "step");
     return h("li", {}, button);
   };
-  const describe = (record: EditRecord): string => `${formatCount(record.moved_samples)} samples · ${formatAge(record.created)}`;
+  const describe = (record: EditRecord): string =>
+    `${formatCount(record.moved_samples)} samples · ${formatAge(record.created)}`;
   const show = (history: History): void => {
-    const entries = history.edits.map((record) => entry(describeDeformation(record.edit.deformation), describe(record), record.index, history.head));
+    const entries = history.edits.map((record) =>
+      entry(describeDeformation(record.edit.deformation), describe(record), record.index, history.head),
+    );
     replaceChildren(list, entry("As loaded", "", 0, history.head), ...entries);
     setText(section.aside, history.edits.length === 0 ? "" : `${history.head} / ${history.edits.length}`);
     // Only the list scrolls to the current entry, never the panel.

@@ -66,11 +66,20 @@ export async function showHome(root: HTMLElement, client: ApiClient): Promise<vo
           "div",
           { class: "home-intro" },
           h("h1", {}, "Edit point clouds at several scales"),
-          h("p", {}, "Paint what stays and what moves, drag, and the fine detail follows. The samples are the model: nothing is meshed."),
+          h(
+            "p",
+            {},
+            "Paint what stays and what moves, drag, and the fine detail follows. The samples are the model: nothing is meshed.",
+          ),
         ),
         uploader.element,
         messages,
-        h("section", { class: "home-clouds", aria: { label: "Clouds on this server" } }, h("div", { class: "home-title" }, h("h2", {}, "On this server"), count), list),
+        h(
+          "section",
+          { class: "home-clouds", aria: { label: "Clouds on this server" } },
+          h("div", { class: "home-title" }, h("h2", {}, "On this server"), count),
+          list,
+        ),
       ),
     ),
   );
@@ -78,9 +87,16 @@ export async function showHome(root: HTMLElement, client: ApiClient): Promise<vo
 }
 
 function sessionsOf(cloud: CloudDocument, sessions: readonly SessionSummary[]): SessionSummary[] {
-  return sessions.filter((session) => session.cloud === cloud.id).sort((a, b) => b.created.localeCompare(a.created));
+  return sessions
+    .filter((session) => session.cloud === cloud.id)
+    .sort((a, b) => b.created.localeCompare(a.created));
 }
 
 function emptyNote(): HTMLElement {
-  return h("div", { class: "empty-note" }, icon("upload"), h("p", {}, "No clouds yet. Drop a file above to begin."));
+  return h(
+    "div",
+    { class: "empty-note" },
+    icon("upload"),
+    h("p", {}, "No clouds yet. Drop a file above to begin."),
+  );
 }

@@ -14,7 +14,12 @@ type ShapeType = "sphere" | "box" | "half_space" | "all";
 type Mode = RegionOperation["mode"];
 
 /** The painting: what each region holds, the brush's size, and shapes by numbers for those who paint without a mouse. */
-export function createRegionsPanel(bus: Bus, store: SessionStore, regions: RegionEditor, radius: number): HTMLElement {
+export function createRegionsPanel(
+  bus: Bus,
+  store: SessionStore,
+  regions: RegionEditor,
+  radius: number,
+): HTMLElement {
   const section = createSection("Regions");
   const rows = (["zero", "one"] as const).map((region) => regionRow(bus, store, regions, region));
   const diagonal = store.document.diagonal;
@@ -31,7 +36,15 @@ export function createRegionsPanel(bus: Bus, store: SessionStore, regions: Regio
   append(section.body, [
     h("div", { class: "region-rows" }, ...rows),
     brush.element,
-    h("p", { class: "hint" }, "Drag on the surface to paint, Shift erases, ", h("kbd", {}, "["), " ", h("kbd", {}, "]"), " size."),
+    h(
+      "p",
+      { class: "hint" },
+      "Drag on the surface to paint, Shift erases, ",
+      h("kbd", {}, "["),
+      " ",
+      h("kbd", {}, "]"),
+      " size.",
+    ),
     shapeForm(store, regions),
   ]);
   return section.element;
@@ -41,7 +54,13 @@ function regionRow(bus: Bus, store: SessionStore, regions: RegionEditor, region:
   const count = h("span", { class: "region-count" });
   const clear = h(
     "button",
-    { type: "button", class: "icon-button small", title: `Clear the ${region}-region`, aria: { label: `Clear the ${region}-region` }, onclick: () => void regions.clear(region) },
+    {
+      type: "button",
+      class: "icon-button small",
+      title: `Clear the ${region}-region`,
+      aria: { label: `Clear the ${region}-region` },
+      onclick: () => void regions.clear(region),
+    },
     icon("trash"),
   );
   const show = (document: SessionDocument): void => {
@@ -64,7 +83,11 @@ function regionRow(bus: Bus, store: SessionStore, regions: RegionEditor, region:
 /** A region operation by numbers. */
 function shapeForm(store: SessionStore, regions: RegionEditor): HTMLElement {
   const { bounds, diagonal } = store.document;
-  const middle = [0, 1, 2].map((axis) => ((bounds.min[axis] ?? 0) + (bounds.max[axis] ?? 0)) / 2) as [number, number, number];
+  const middle = [0, 1, 2].map((axis) => ((bounds.min[axis] ?? 0) + (bounds.max[axis] ?? 0)) / 2) as [
+    number,
+    number,
+    number,
+  ];
   let region: RegionName = "zero";
   let mode: Mode = "add";
   let type: ShapeType = "sphere";
@@ -88,15 +111,38 @@ function shapeForm(store: SessionStore, regions: RegionEditor): HTMLElement {
     all: () => ({ type: "all" }),
   };
   const refresh = (): void => replaceChildren(fields, ...byType[type]);
-  const regionSelect = selectField("Region", [["zero", "Zero (stays)"], ["one", "One (moves)"]], region, (value) => {
-    region = value;
-  });
-  const modeSelect = selectField("Do", [["add", "Add"], ["remove", "Remove"], ["intersect", "Keep only"], ["set", "Replace by"]], mode, (value) => {
-    mode = value;
-  });
+  const regionSelect = selectField(
+    "Region",
+    [
+      ["zero", "Zero (stays)"],
+      ["one", "One (moves)"],
+    ],
+    region,
+    (value) => {
+      region = value;
+    },
+  );
+  const modeSelect = selectField(
+    "Do",
+    [
+      ["add", "Add"],
+      ["remove", "Remove"],
+      ["intersect", "Keep only"],
+      ["set", "Replace by"],
+    ],
+    mode,
+    (value) => {
+      mode = value;
+    },
+  );
   const typeSelect = selectField(
     "Shape",
-    [["sphere", "Sphere"], ["box", "Box"], ["half_space", "Half-space"], ["all", "Everything"]],
+    [
+      ["sphere", "Sphere"],
+      ["box", "Box"],
+      ["half_space", "Half-space"],
+      ["all", "Everything"],
+    ],
     type,
     (value) => {
       type = value;

@@ -15,17 +15,24 @@ export interface Shortcut {
 export function belongsToField(event: KeyboardEvent): boolean {
   const target = event.target;
   if (!(target instanceof HTMLElement)) return false;
-  if (target.isContentEditable || target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement) return true;
+  if (
+    target.isContentEditable ||
+    target instanceof HTMLTextAreaElement ||
+    target instanceof HTMLSelectElement
+  )
+    return true;
   return target instanceof HTMLInputElement && target.type !== "checkbox";
 }
 
 /** Matches a bare key, whatever the case. */
 export function key(name: string): (event: KeyboardEvent) => boolean {
-  return (event) => !event.ctrlKey && !event.metaKey && !event.altKey && event.key.toLowerCase() === name.toLowerCase();
+  return (event) =>
+    !event.ctrlKey && !event.metaKey && !event.altKey && event.key.toLowerCase() === name.toLowerCase();
 }
 
 export function ctrl(name: string, shift = false): (event: KeyboardEvent) => boolean {
-  return (event) => (event.ctrlKey || event.metaKey) && event.shiftKey === shift && event.key.toLowerCase() === name;
+  return (event) =>
+    (event.ctrlKey || event.metaKey) && event.shiftKey === shift && event.key.toLowerCase() === name;
 }
 
 /** Runs the shortcuts of the table; returns the function that ends it. */
@@ -46,9 +53,16 @@ export function listen(shortcuts: readonly Shortcut[]): () => void {
 }
 
 /** The sheet of all shortcuts, searchable. */
-export function createShortcutSheet(shortcuts: readonly Shortcut[]): { element: HTMLDialogElement; show(): void } {
+export function createShortcutSheet(shortcuts: readonly Shortcut[]): {
+  element: HTMLDialogElement;
+  show(): void;
+} {
   const body = h("div", { class: "sheet-body" });
-  const search = h("input", { type: "search", placeholder: "Search", aria: { label: "Search the shortcuts" } });
+  const search = h("input", {
+    type: "search",
+    placeholder: "Search",
+    aria: { label: "Search the shortcuts" },
+  });
   const fill = (): void => {
     const wanted = search.value.trim().toLowerCase();
     const rows = shortcuts.filter((row) => `${row.label} ${row.keys}`.toLowerCase().includes(wanted));
@@ -62,14 +76,28 @@ export function createShortcutSheet(shortcuts: readonly Shortcut[]): { element: 
           {},
           ...rows
             .filter((row) => row.group === group)
-            .map((row) => h("div", {}, h("dt", {}, row.label), h("dd", {}, ...row.keys.split(" ").map((name) => h("kbd", {}, name))))),
+            .map((row) =>
+              h(
+                "div",
+                {},
+                h("dt", {}, row.label),
+                h("dd", {}, ...row.keys.split(" ").map((name) => h("kbd", {}, name))),
+              ),
+            ),
         ),
       ),
     );
-    replaceChildren(body, ...(groups.length > 0 ? groups : [h("p", { class: "hint" }, "No shortcut is called that.")]));
+    replaceChildren(
+      body,
+      ...(groups.length > 0 ? groups : [h("p", { class: "hint" }, "No shortcut is called that.")]),
+    );
   };
   search.addEventListener("input", fill);
-  const close = h("button", { type: "button", class: "icon-button", aria: { label: "Close" }, onclick: () => element.close() }, icon("close"));
+  const close = h(
+    "button",
+    { type: "button", class: "icon-button", aria: { label: "Close" }, onclick: () => element.close() },
+    icon("close"),
+  );
   const element = h(
     "dialog",
     { class: "sheet", aria: { label: "Shortcuts" } },

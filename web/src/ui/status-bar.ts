@@ -12,7 +12,12 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
   const radius = h("span", { class: "status-item", data: { status: "spacing" } });
 
   bus.on("load.changed", ({ loaded, total, complete }) => {
-    setText(samples, complete || loaded >= total ? `${formatCount(total)} samples` : `${formatCount(loaded)} of ${formatCount(total)} samples`);
+    setText(
+      samples,
+      complete || loaded >= total
+        ? `${formatCount(total)} samples`
+        : `${formatCount(loaded)} of ${formatCount(total)} samples`,
+    );
   });
   const showSession = (): void => {
     const { document } = store;
@@ -31,8 +36,21 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
   });
   bus.on("connection.changed", (state) => {
     connection.dataset["state"] = state;
-    setText(connection, state === "live" ? "live" : state === "connecting" ? "connecting…" : "connection lost, trying again…");
+    setText(
+      connection,
+      state === "live" ? "live" : state === "connecting" ? "connecting…" : "connection lost, trying again…",
+    );
   });
   showSession();
-  return h("footer", { class: "status-bar", aria: { label: "Status" } }, connection, samples, radius, h("span", { class: "spacer" }), timing, badge, revision);
+  return h(
+    "footer",
+    { class: "status-bar", aria: { label: "Status" } },
+    connection,
+    samples,
+    radius,
+    h("span", { class: "spacer" }),
+    timing,
+    badge,
+    revision,
+  );
 }

@@ -13,9 +13,18 @@ export function createToasts(bus: Bus): HTMLElement {
   const list = h("div", { class: "toast-area" }, urgent, holder);
 
   const show = (toast: Toast): void => {
-    const close = h("button", { class: "icon-button small", type: "button", title: "Dismiss", aria: { label: "Dismiss" } }, icon("close"));
+    const close = h(
+      "button",
+      { class: "icon-button small", type: "button", title: "Dismiss", aria: { label: "Dismiss" } },
+      icon("close"),
+    );
     const lines = (toast.lines ?? []).map((line) => h("p", {}, line));
-    const element = h("div", { class: `toast ${toast.kind}` }, h("div", { class: "toast-text" }, h("strong", {}, toast.title), ...lines), close);
+    const element = h(
+      "div",
+      { class: `toast ${toast.kind}` },
+      h("div", { class: "toast-text" }, h("strong", {}, toast.title), ...lines),
+      close,
+    );
     const parent = toast.kind === "error" ? urgent : holder;
     const timer = window.setTimeout(() => element.remove(), SHOW_MS[toast.kind]);
     close.addEventListener("click", () => {

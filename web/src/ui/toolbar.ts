@@ -27,7 +27,11 @@ const TOOLS: readonly (readonly ToolButton[])[] = [
 /** The rail of tools at the left. */
 export function createToolbar(bus: Bus): HTMLElement {
   const buttons = new Map<ToolName, HTMLButtonElement>();
-  const rail = h("div", { class: "rail", role: "toolbar", aria: { label: "Tools", orientation: "vertical" } });
+  const rail = h("div", {
+    class: "rail",
+    role: "toolbar",
+    aria: { label: "Tools", orientation: "vertical" },
+  });
   for (const group of TOOLS) {
     const holder = h("div", { class: "rail-group panel" });
     for (const tool of group) {
@@ -36,7 +40,11 @@ export function createToolbar(bus: Bus): HTMLElement {
         {
           type: "button",
           class: `tool ${tool.class ?? ""}`,
-          aria: { label: `${tool.label} (${tool.key})`, pressed: String(tool.name === "orbit"), keyshortcuts: tool.key },
+          aria: {
+            label: `${tool.label} (${tool.key})`,
+            pressed: String(tool.name === "orbit"),
+            keyshortcuts: tool.key,
+          },
           data: { tip: `${tool.label}`, key: tool.key, tool: tool.name },
           onclick: () => bus.invoke("tool.activate", tool.name),
         },
@@ -49,7 +57,13 @@ export function createToolbar(bus: Bus): HTMLElement {
   }
   const frame = h(
     "button",
-    { type: "button", class: "tool", aria: { label: "Frame the object (F)", keyshortcuts: "F" }, data: { tip: "Frame the object", key: "F" }, onclick: () => bus.invoke("view.frame") },
+    {
+      type: "button",
+      class: "tool",
+      aria: { label: "Frame the object (F)", keyshortcuts: "F" },
+      data: { tip: "Frame the object", key: "F" },
+      onclick: () => bus.invoke("view.frame"),
+    },
     icon("frame"),
   );
   rail.append(h("div", { class: "rail-group panel" }, frame));

@@ -14,7 +14,17 @@ const EXTENSIONS: Record<ExportFormat, string> = { ply: "ply", draco: "drc", xyz
 /** The name, and what concerns the session as a whole: undo, redo, link, export, help. */
 export function createTopBar(bus: Bus, client: ApiClient, store: SessionStore): HTMLElement {
   const button = (name: IconName, label: string, key: string, action: () => void): HTMLButtonElement =>
-    h("button", { type: "button", class: "icon-button", aria: { label: `${label} (${key})` }, data: { tip: label, key }, onclick: action }, icon(name));
+    h(
+      "button",
+      {
+        type: "button",
+        class: "icon-button",
+        aria: { label: `${label} (${key})` },
+        data: { tip: label, key },
+        onclick: action,
+      },
+      icon(name),
+    );
   const undo = button("undo", "Undo", "Ctrl Z", () => void bus.invoke("edit.undo"));
   const redo = button("redo", "Redo", "Ctrl Y", () => void bus.invoke("edit.redo"));
   undo.dataset["action"] = "undo";
@@ -27,14 +37,25 @@ export function createTopBar(bus: Bus, client: ApiClient, store: SessionStore): 
   });
   const link = h(
     "button",
-    { type: "button", class: "icon-button", aria: { label: "Copy the link to this view" }, data: { tip: "Copy link" }, onclick: () => void copyLink(bus) },
+    {
+      type: "button",
+      class: "icon-button",
+      aria: { label: "Copy the link to this view" },
+      data: { tip: "Copy link" },
+      onclick: () => void copyLink(bus),
+    },
     icon("link"),
   );
   const help = button("help", "Shortcuts", "?", () => bus.invoke("shortcuts.show"));
   return h(
     "header",
     { class: "top-bar" },
-    h("a", { class: "brand", href: "./", aria: { label: "Pointwright, all clouds" } }, logo(), h("span", {}, "Pointwright")),
+    h(
+      "a",
+      { class: "brand", href: "./", aria: { label: "Pointwright, all clouds" } },
+      logo(),
+      h("span", {}, "Pointwright"),
+    ),
     h("span", { class: "divider", aria: { hidden: "true" } }),
     h("h1", { class: "session-name" }, store.document.name),
     h("span", { class: "spacer" }),
@@ -51,7 +72,11 @@ async function copyLink(bus: Bus): Promise<void> {
     await navigator.clipboard.writeText(location.href);
     bus.fire("toast", { kind: "success", title: "Link copied" });
   } catch {
-    bus.fire("toast", { kind: "info", title: "The link is in the address bar", lines: ["The browser did not let it be copied."] });
+    bus.fire("toast", {
+      kind: "info",
+      title: "The link is in the address bar",
+      lines: ["The browser did not let it be copied."],
+    });
   }
 }
 
@@ -61,7 +86,13 @@ function exportMenu(client: ApiClient, store: SessionStore): HTMLElement {
   const items = FORMATS.map(([format, title, hint]) =>
     h(
       "a",
-      { class: "menu-item", href: client.exportUrl(store.id, format), download: `${name}.${EXTENSIONS[format]}`, data: { format }, onclick: () => menu.removeAttribute("open") },
+      {
+        class: "menu-item",
+        href: client.exportUrl(store.id, format),
+        download: `${name}.${EXTENSIONS[format]}`,
+        data: { format },
+        onclick: () => menu.removeAttribute("open"),
+      },
       h("strong", {}, title),
       h("small", {}, hint),
     ),

@@ -22,7 +22,10 @@ export function createTransformPanel(bus: Bus, editor: TransformEditor): Transfo
   let tool: ToolName = "orbit";
   let shown: TransformState = editor.state;
 
-  const vector = vectorField("Move by", [0, 0, 0], { onChange: () => editor.set(translation(vector.value)), onEnter: commit });
+  const vector = vectorField("Move by", [0, 0, 0], {
+    onChange: () => editor.set(translation(vector.value)),
+    onEnter: commit,
+  });
   const turn = (): void => editor.set(rotation(pivot.value, direction.value, angle.value));
   const angle = numberField("Angle", 0, { unit: "°", onChange: turn, onEnter: commit });
   const direction = vectorField("Axis", [0, 1, 0], { onChange: turn, onEnter: commit });
@@ -34,7 +37,12 @@ export function createTransformPanel(bus: Bus, editor: TransformEditor): Transfo
   });
   const pivotButton = h(
     "button",
-    { type: "button", class: "button quiet", aria: { pressed: "false" }, onclick: () => editor.setPivotEditing(!shown.pivotEditing) },
+    {
+      type: "button",
+      class: "button quiet",
+      aria: { pressed: "false" },
+      onclick: () => editor.setPivotEditing(!shown.pivotEditing),
+    },
     icon("pivot"),
     "Drag the pivot",
   );
@@ -54,24 +62,59 @@ export function createTransformPanel(bus: Bus, editor: TransformEditor): Transfo
     editor.setAxis(shown.axis === axis ? null : axis);
     if (tool === "rotate" && !editor.pending) direction.set(AXES[axis]);
   };
-  const apply = h("button", { type: "button", class: "button primary", onclick: commit }, icon("check"), "Apply");
-  const cancel = h("button", { type: "button", class: "button", onclick: () => bus.invoke("edit.cancel") }, "Cancel");
-  const carry = checkField("Carry the detail along", shown.carryDetail, (checked) => editor.setCarryDetail(checked));
+  const apply = h(
+    "button",
+    { type: "button", class: "button primary", onclick: commit },
+    icon("check"),
+    "Apply",
+  );
+  const cancel = h(
+    "button",
+    { type: "button", class: "button", onclick: () => bus.invoke("edit.cancel") },
+    "Cancel",
+  );
+  const carry = checkField("Carry the detail along", shown.carryDetail, (checked) =>
+    editor.setCarryDetail(checked),
+  );
   const summary = h("p", { class: "hint", aria: { live: "polite" } });
   const fields = h("div", { class: "transform-fields" });
   const start = h(
     "div",
     { class: "button-row" },
-    h("button", { type: "button", class: "button", onclick: () => bus.invoke("tool.activate", "move") }, icon("move"), "Move"),
-    h("button", { type: "button", class: "button", onclick: () => bus.invoke("tool.activate", "rotate") }, icon("rotate"), "Rotate"),
+    h(
+      "button",
+      { type: "button", class: "button", onclick: () => bus.invoke("tool.activate", "move") },
+      icon("move"),
+      "Move",
+    ),
+    h(
+      "button",
+      { type: "button", class: "button", onclick: () => bus.invoke("tool.activate", "rotate") },
+      icon("rotate"),
+      "Rotate",
+    ),
   );
   append(section.body, [fields, summary]);
 
   const layOut = (): void => {
-    const axes = h("div", { class: "axis-buttons", role: "group", aria: { label: "Axis constraint" } }, ...axisButtons);
+    const axes = h(
+      "div",
+      { class: "axis-buttons", role: "group", aria: { label: "Axis constraint" } },
+      ...axisButtons,
+    );
     const ends = h("div", { class: "button-row" }, apply, cancel);
     if (tool === "move") replaceChildren(fields, vector.element, axes, pivotButton, carry.element, ends);
-    else if (tool === "rotate") replaceChildren(fields, angle.element, direction.element, axes, pivot.element, pivotButton, carry.element, ends);
+    else if (tool === "rotate")
+      replaceChildren(
+        fields,
+        angle.element,
+        direction.element,
+        axes,
+        pivot.element,
+        pivotButton,
+        carry.element,
+        ends,
+      );
     else replaceChildren(fields, start);
   };
   const show = (state: TransformState): void => {
@@ -92,9 +135,14 @@ export function createTransformPanel(bus: Bus, editor: TransformEditor): Transfo
     apply.disabled = !ready;
     cancel.disabled = !ready;
     pivotButton.setAttribute("aria-pressed", String(state.pivotEditing));
-    for (const [index, button] of axisButtons.entries()) button.setAttribute("aria-pressed", String(state.axis === "xyz"[index]));
-    for (const field of [...vector.fields, ...direction.fields, ...pivot.fields, angle]) field.input.disabled = state.obstacle !== null;
-    setText(summary, state.obstacle ?? (ready && deformation ? describeDeformation(deformation) : hintOf(tool)));
+    for (const [index, button] of axisButtons.entries())
+      button.setAttribute("aria-pressed", String(state.axis === "xyz"[index]));
+    for (const field of [...vector.fields, ...direction.fields, ...pivot.fields, angle])
+      field.input.disabled = state.obstacle !== null;
+    setText(
+      summary,
+      state.obstacle ?? (ready && deformation ? describeDeformation(deformation) : hintOf(tool)),
+    );
     summary.classList.toggle("obstacle", state.obstacle !== null);
   };
   bus.on("transform.changed", show);

@@ -8,9 +8,17 @@ import { icon } from "./icons";
 import { problemCard } from "./problem-card";
 
 /** Drop a file anywhere, or pick one: it is sent with progress, and refused with reasons. */
-export function createUploader(client: ApiClient, done: (cloud: CloudDocument) => void): { element: HTMLElement } {
+export function createUploader(
+  client: ApiClient,
+  done: (cloud: CloudDocument) => void,
+): { element: HTMLElement } {
   const id = freshId();
-  const input = h("input", { type: "file", id, class: "visually-hidden", accept: ".ply,.drc,.xyz,.txt,.asc" });
+  const input = h("input", {
+    type: "file",
+    id,
+    class: "visually-hidden",
+    accept: ".ply,.drc,.xyz,.txt,.asc",
+  });
   const dropId = freshId();
   const drop = h("input", { type: "checkbox", id: dropId });
   const status = h("div", { class: "upload-status", aria: { live: "polite" } });
@@ -18,9 +26,20 @@ export function createUploader(client: ApiClient, done: (cloud: CloudDocument) =
     "div",
     { class: "drop-zone" },
     icon("upload"),
-    h("p", { class: "drop-title" }, "Drop a point cloud, or ", h("label", { htmlFor: id, class: "file-label" }, "choose a file"), input),
+    h(
+      "p",
+      { class: "drop-title" },
+      "Drop a point cloud, or ",
+      h("label", { htmlFor: id, class: "file-label" }, "choose a file"),
+      input,
+    ),
     h("p", { class: "hint" }, "PLY, Draco or XYZ. The vertices of a mesh are taken as samples."),
-    h("p", { class: "drop-option" }, drop, h("label", { htmlFor: dropId }, "Leave out samples without finite coordinates")),
+    h(
+      "p",
+      { class: "drop-option" },
+      drop,
+      h("label", { htmlFor: dropId }, "Leave out samples without finite coordinates"),
+    ),
     status,
   );
 
@@ -28,7 +47,11 @@ export function createUploader(client: ApiClient, done: (cloud: CloudDocument) =
     const controller = new AbortController();
     const bar = h("progress", { max: 1, value: 0, aria: { label: `Sending ${file.name}` } });
     const text = h("span", {}, `${file.name}, ${formatBytes(file.size)}`);
-    const cancel = h("button", { type: "button", class: "button quiet", onclick: () => controller.abort() }, "Cancel");
+    const cancel = h(
+      "button",
+      { type: "button", class: "button quiet", onclick: () => controller.abort() },
+      "Cancel",
+    );
     replaceChildren(status, h("div", { class: "upload-row" }, text, cancel), bar);
     zone.classList.add("busy");
     try {

@@ -13,7 +13,11 @@ import { bumpySphere, plyVertices } from "./shapes";
 
 const POLICY =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; worker-src 'self' blob:";
-const TYPES: Record<string, string> = { ".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8" };
+const TYPES: Record<string, string> = {
+  ".html": "text/html; charset=utf-8",
+  ".js": "text/javascript; charset=utf-8",
+  ".css": "text/css; charset=utf-8",
+};
 
 const [port = "8080", mesh] = process.argv.slice(2);
 const shape = mesh ? plyVertices(mesh) : bumpySphere(60_000);
@@ -23,16 +27,37 @@ const dist = fileURLToPath(new URL("../../dist", import.meta.url));
 
 const created = new Date().toISOString();
 const cloud = {
-  id: "mockcloud0000000000001", name: `${session.name}.ply`, bytes: 24 * shape.count, created, sample_count: shape.count,
-  bounds: session.document().bounds, origin: session.origin, diagonal: session.document().diagonal,
-  report: { format: "ply", encoding: "ascii", declared_count: shape.count, dropped_non_finite: 0, duplicate_count: 0, from_mesh: true, position_is_double: false, attributes: [], skipped: ["confidence"] },
+  id: "mockcloud0000000000001",
+  name: `${session.name}.ply`,
+  bytes: 24 * shape.count,
+  created,
+  sample_count: shape.count,
+  bounds: session.document().bounds,
+  origin: session.origin,
+  diagonal: session.document().diagonal,
+  report: {
+    format: "ply",
+    encoding: "ascii",
+    declared_count: shape.count,
+    dropped_non_finite: 0,
+    duplicate_count: 0,
+    from_mesh: true,
+    position_is_double: false,
+    attributes: [],
+    skipped: ["confidence"],
+  },
 };
 
 function broadcast(frame: Uint8Array): void {
   for (const stream of streams) stream.write(encodeStreamRecord(1, frame));
 }
 
-function json(response: ServerResponse, status: number, body: unknown, headers: Record<string, string> = {}): void {
+function json(
+  response: ServerResponse,
+  status: number,
+  body: unknown,
+  headers: Record<string, string> = {},
+): void {
   const type = status < 400 ? "application/json; charset=utf-8" : "application/problem+json";
   response.writeHead(status, { "Content-Type": type, ...headers });
   response.end(JSON.stringify(body));
@@ -44,7 +69,12 @@ async function bodyOf(request: IncomingMessage): Promise<unknown> {
   return chunks.length > 0 ? JSON.parse(Buffer.concat(chunks).toString()) : null;
 }
 
-async function handleSession(request: IncomingMessage, response: ServerResponse, rest: string[], query: URLSearchParams): Promise<void> {
+async function handleSession(
+  request: IncomingMessage,
+  response: ServerResponse,
+  rest: string[],
+  query: URLSearchParams,
+): Promise<void> {
   const [what, region, operations] = rest;
   const method = request.method ?? "GET";
   if (what === "stream") {
@@ -96,13 +126,22 @@ createServer((request, response) => {
   response.setHeader("Content-Security-Policy", POLICY);
   if (parts[0] !== "v1") {
     const file = resolve(dist, parts.length > 0 ? parts.join("/") : "index.html");
-    if (!file.startsWith(dist) || !existsSync(file) || !statSync(file).isFile()) return void response.writeHead(404).end();
+    if (!file.startsWith(dist) || !existsSync(file) || !statSync(file).isFile())
+      return void response.writeHead(404).end();
     response.writeHead(200, { "Content-Type": TYPES[extname(file)] ?? "application/octet-stream" });
     return void createReadStream(file).pipe(response);
   }
-  if (parts[1] === "sessions" && parts[2] === session.id) return void handleSession(request, response, parts.slice(3), url.searchParams);
+  if (parts[1] === "sessions" && parts[2] === session.id)
+    return void handleSession(request, response, parts.slice(3), url.searchParams);
   if (parts[1] === "clouds" && request.method === "GET") return json(response, 200, { clouds: [cloud] });
-  if (parts[1] === "sessions" && request.method === "GET") return json(response, 200, { sessions: [session.document()] });
+  if (parts[1] === "sessions" && request.method === "GET")
+    return json(response, 200, { sessions: [session.document()] });
   if (parts[1] === "sessions" && request.method === "POST") return json(response, 202, session.document());
-  json(response, 422, { type: "/problems/malformed-cloud", title: "The cloud is malformed", status: 422, detail: "The mock reads no files.", request_id: "mock" });
+  json(response, 422, {
+    type: "/problems/malformed-cloud",
+    title: "The cloud is malformed",
+    status: 422,
+    detail: "The mock reads no files.",
+    request_id: "mock",
+  });
 }).listen(Number(port), "127.0.0.1", () => console.log(`mock on ${port}`));

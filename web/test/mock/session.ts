@@ -1,7 +1,22 @@
-import type { Deformation, EditRecord, RegionName, RegionOperation, SessionDocument, Shape } from "../../src/api/types";
-import { distance, distanceToSegment, dot, length, normalise, subtract, type Vec3 } from "../../src/math/vec3";
-import { type FrameBlock, type FrameHeader, frameAttributes } from "../../src/protocol/frames";
+import type {
+  Deformation,
+  EditRecord,
+  RegionName,
+  RegionOperation,
+  SessionDocument,
+  Shape,
+} from "../../src/api/types";
+import {
+  distance,
+  distanceToSegment,
+  dot,
+  length,
+  normalise,
+  subtract,
+  type Vec3,
+} from "../../src/math/vec3";
 import { encodeFrame } from "../../src/protocol/frame-tools";
+import { type FrameBlock, type FrameHeader, frameAttributes } from "../../src/protocol/frames";
 import { layerSizes } from "../../src/scene/layers";
 import type { MockShape } from "./shapes";
 
@@ -21,7 +36,11 @@ export class MockSession {
   private readonly t_: Float32Array;
   readonly origin: Vec3;
 
-  constructor(readonly id: string, readonly name: string, shape: MockShape) {
+  constructor(
+    readonly id: string,
+    readonly name: string,
+    shape: MockShape,
+  ) {
     this.shape_ = shape;
     this.marks = new Uint8Array(shape.count);
     this.t_ = new Float32Array(shape.count);
@@ -47,12 +66,29 @@ export class MockSession {
     const diagonal = distance(this.lower_, this.upper_);
     const samples = (mark: number): number => this.marks.reduce((sum, m) => sum + (m === mark ? 1 : 0), 0);
     return {
-      id: this.id, name: this.name, cloud: "mockcloud0000000000001", state: "ready", progress: { phase: "ready", fraction: 1 },
-      revision: this.revision, created: new Date(0).toISOString(), sample_count: this.shape_.count, origin: this.origin,
-      bounds: { min: this.lower_, max: this.upper_ }, diagonal, spacing: diagonal * 1.08 / Math.sqrt(this.shape_.count),
-      levels: [{ level: 0, scale: 0.02 * diagonal }, { level: 1, scale: 0 }], decomposition: [],
-      regions: { zero: { samples: samples(1), operations: this.operations.zero.length }, one: { samples: samples(2), operations: this.operations.one.length } },
-      history: { head: this.head, edits: this.edits.length }, timings_ms: {},
+      id: this.id,
+      name: this.name,
+      cloud: "mockcloud0000000000001",
+      state: "ready",
+      progress: { phase: "ready", fraction: 1 },
+      revision: this.revision,
+      created: new Date(0).toISOString(),
+      sample_count: this.shape_.count,
+      origin: this.origin,
+      bounds: { min: this.lower_, max: this.upper_ },
+      diagonal,
+      spacing: (diagonal * 1.08) / Math.sqrt(this.shape_.count),
+      levels: [
+        { level: 0, scale: 0.02 * diagonal },
+        { level: 1, scale: 0 },
+      ],
+      decomposition: [],
+      regions: {
+        zero: { samples: samples(1), operations: this.operations.zero.length },
+        one: { samples: samples(2), operations: this.operations.one.length },
+      },
+      history: { head: this.head, edits: this.edits.length },
+      timings_ms: {},
     };
   }
 
@@ -61,10 +97,13 @@ export class MockSession {
     let changed = 0;
     for (let i = 0; i < this.shape_.count; ++i) {
       const n = this.shape_.normals;
-      const facing = operation.facing ? dot(operation.facing, [n[3 * i] ?? 0, n[3 * i + 1] ?? 0, n[3 * i + 2] ?? 0]) > 0 : true;
+      const facing = operation.facing
+        ? dot(operation.facing, [n[3 * i] ?? 0, n[3 * i + 1] ?? 0, n[3 * i + 2] ?? 0]) > 0
+        : true;
       if (!facing || !contains(operation.shape, this.position(i))) continue;
       const mark = this.marks[i] ?? 0;
-      const next = operation.mode === "remove" ? (mark === own ? 0 : mark) : mark === 0 || operation.steal ? own : mark;
+      const next =
+        operation.mode === "remove" ? (mark === own ? 0 : mark) : mark === 0 || operation.steal ? own : mark;
       if (next !== mark) ++changed;
       this.marks[i] = next;
     }
@@ -82,7 +121,14 @@ export class MockSession {
 
   commit(edit: EditRecord["edit"]): EditRecord {
     this.edits.length = this.head;
-    const record: EditRecord = { index: this.head + 1, edit, created: new Date().toISOString(), moved_samples: this.marks.length, zero_samples: 0, one_samples: 0 };
+    const record: EditRecord = {
+      index: this.head + 1,
+      edit,
+      created: new Date().toISOString(),
+      moved_samples: this.marks.length,
+      zero_samples: 0,
+      one_samples: 0,
+    };
     this.edits.push(record);
     this.head += 1;
     this.revision += 1;
@@ -96,7 +142,9 @@ export class MockSession {
       let count = 0;
       for (let i = 0; i < this.marks.length; ++i) {
         if (this.marks[i] !== own) continue;
-        this.position(i).forEach((value, axis) => (sum[axis] = (sum[axis] ?? 0) + value));
+        this.position(i).forEach((value, axis) => {
+          sum[axis] = (sum[axis] ?? 0) + value;
+        });
         ++count;
       }
       return count ? [(sum[0] ?? 0) / count, (sum[1] ?? 0) / count, (sum[2] ?? 0) / count] : null;
@@ -127,14 +175,29 @@ export class MockSession {
     }
     const { normal, t, detail, marks } = frameAttributes;
     const header: FrameHeader = {
-      kind: "key", level: 1, attributes: normal | t | detail | marks, revision: this.revision, sequence, sampleCount: count,
-      blockSize: BLOCK, blockCount: blocks.length, presentBlocks: blocks.length, origin: [...this.origin], detailRange: 0.06,
-      stretchRange: 0, bounds: { center: [0, 0, 0], radius: distance(this.lower_, this.upper_) / 2 },
+      kind: "key",
+      level: 1,
+      attributes: normal | t | detail | marks,
+      revision: this.revision,
+      sequence,
+      sampleCount: count,
+      blockSize: BLOCK,
+      blockCount: blocks.length,
+      presentBlocks: blocks.length,
+      origin: [...this.origin],
+      detailRange: 0.06,
+      stretchRange: 0,
+      bounds: { center: [0, 0, 0], radius: distance(this.lower_, this.upper_) / 2 },
     };
     return encodeFrame({ header, blocks });
   }
 
-  private block(number: number, from: number, count: number, deformations: readonly Deformation[]): FrameBlock {
+  private block(
+    number: number,
+    from: number,
+    count: number,
+    deformations: readonly Deformation[],
+  ): FrameBlock {
     const points: Vec3[] = [];
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
@@ -150,21 +213,29 @@ export class MockSession {
       });
     }
     const block: FrameBlock = {
-      number, count, minimum: low as [number, number, number],
+      number,
+      count,
+      minimum: low as [number, number, number],
       extent: low.map((value, axis) => (high[axis] ?? 0) - value) as [number, number, number],
-      positionT: new Uint16Array(4 * count), normal: new Int16Array(2 * count), detailStretch: new Uint16Array(2 * count),
-      color: null, marks: new Uint8Array(count), ids: null,
+      positionT: new Uint16Array(4 * count),
+      normal: new Int16Array(2 * count),
+      detailStretch: new Uint16Array(2 * count),
+      color: null,
+      marks: new Uint8Array(count),
+      ids: null,
     };
     points.forEach((p, lane) => {
       const i = this.order_[from + lane] ?? 0;
       p.forEach((value, axis) => {
         const extent = block.extent[axis] ?? 0;
-        block.positionT[4 * lane + axis] = extent > 0 ? Math.round((65535 * (value - (block.minimum[axis] ?? 0))) / extent) : 0;
+        block.positionT[4 * lane + axis] =
+          extent > 0 ? Math.round((65535 * (value - (block.minimum[axis] ?? 0))) / extent) : 0;
       });
       block.positionT[4 * lane + 3] = Math.round(65535 * (this.t_[i] ?? 0));
       const n = this.shape_.normals;
       block.normal?.set(octahedral([n[3 * i] ?? 0, n[3 * i + 1] ?? 0, n[3 * i + 2] ?? 0]), 2 * lane);
-      if (block.detailStretch) block.detailStretch[2 * lane] = Math.round(((this.shape_.detail[i] ?? 0) / 0.06) * 32767) & 0xffff;
+      if (block.detailStretch)
+        block.detailStretch[2 * lane] = Math.round(((this.shape_.detail[i] ?? 0) / 0.06) * 32767) & 0xffff;
       if (block.marks) block.marks[lane] = this.marks[i] ?? 0;
     });
     return block;
@@ -174,33 +245,52 @@ export class MockSession {
 /** Samples by layer, and within a layer in an order that goes along the surface. */
 function slotOrder(shape: MockShape): Uint32Array {
   const coherent = Array.from({ length: shape.count }, (_, i) => i);
-  const key = (i: number): number => [0, 1, 2].reduce((sum, axis) => sum * 64 + Math.floor(((shape.positions[3 * i + axis] ?? 0) + 2) * 16), 0);
+  const key = (i: number): number =>
+    [0, 1, 2].reduce(
+      (sum, axis) => sum * 64 + Math.floor(((shape.positions[3 * i + axis] ?? 0) + 2) * 16),
+      0,
+    );
   const keys = coherent.map(key);
   coherent.sort((a, b) => (keys[a] ?? 0) - (keys[b] ?? 0));
   const slots: number[] = [];
   for (let i = 0; i < shape.count; i += 64) slots.push(coherent[i] ?? 0);
-  for (let step = 32; step >= 1; step /= 2) for (let i = step; i < shape.count; i += 2 * step) slots.push(coherent[i] ?? 0);
+  for (let step = 32; step >= 1; step /= 2)
+    for (let i = step; i < shape.count; i += 2 * step) slots.push(coherent[i] ?? 0);
   return Uint32Array.from(slots);
 }
 
 function contains(shape: Shape, p: Vec3): boolean {
   if (shape.type === "all") return true;
   if (shape.type === "sphere") return distance(p, shape.center) <= shape.radius;
-  if (shape.type === "box") return p.every((value, axis) => value >= (shape.min[axis] ?? 0) && value <= (shape.max[axis] ?? 0));
+  if (shape.type === "box")
+    return p.every((value, axis) => value >= (shape.min[axis] ?? 0) && value <= (shape.max[axis] ?? 0));
   if (shape.type === "half_space") return dot(subtract(p, shape.point), shape.normal) >= 0;
-  return shape.vertices.some((vertex, i) => distanceToSegment(p, vertex, shape.vertices[i + 1] ?? vertex) <= shape.radius);
+  return shape.vertices.some(
+    (vertex, i) => distanceToSegment(p, vertex, shape.vertices[i + 1] ?? vertex) <= shape.radius,
+  );
 }
 
 export function deform(p: Vec3, deformation: Deformation, t: number): Vec3 {
-  if (deformation.type === "translation") return [p[0] + t * deformation.vector[0], p[1] + t * deformation.vector[1], p[2] + t * deformation.vector[2]];
+  if (deformation.type === "translation")
+    return [
+      p[0] + t * deformation.vector[0],
+      p[1] + t * deformation.vector[1],
+      p[2] + t * deformation.vector[2],
+    ];
   const axis = normalise(deformation.axis.direction);
   const r = subtract(p, deformation.axis.point);
   const angle = (t * deformation.angle_deg * Math.PI) / 180;
   const c = Math.cos(angle);
   const s = Math.sin(angle);
   const along = dot(axis, r) * (1 - c);
-  const x: Vec3 = [axis[1] * r[2] - axis[2] * r[1], axis[2] * r[0] - axis[0] * r[2], axis[0] * r[1] - axis[1] * r[0]];
-  return [0, 1, 2].map((k) => (deformation.axis.point[k] ?? 0) + (r[k] ?? 0) * c + (x[k] ?? 0) * s + (axis[k] ?? 0) * along) as unknown as Vec3;
+  const x: Vec3 = [
+    axis[1] * r[2] - axis[2] * r[1],
+    axis[2] * r[0] - axis[0] * r[2],
+    axis[0] * r[1] - axis[1] * r[0],
+  ];
+  return [0, 1, 2].map(
+    (k) => (deformation.axis.point[k] ?? 0) + (r[k] ?? 0) * c + (x[k] ?? 0) * s + (axis[k] ?? 0) * along,
+  ) as unknown as Vec3;
 }
 
 function octahedral(n: Vec3): [number, number] {
