@@ -455,7 +455,6 @@ export interface components {
         };
         Cloud: {
             id: components["schemas"]["Id"];
-            /** @description Empty where none was given */
             name: string;
             /** @description Of the upload */
             sha256: string;
@@ -515,7 +514,6 @@ export interface components {
         SessionState: "building" | "ready" | "failed";
         SessionSummary: {
             id: components["schemas"]["Id"];
-            /** @description Empty where none was given */
             name: string;
             cloud: components["schemas"]["Id"];
             state: components["schemas"]["SessionState"];
@@ -706,7 +704,7 @@ export interface components {
             request_id: string;
             /** @description Every member at fault */
             errors?: {
-                /** @description RFC 6901; empty for the whole document */
+                /** @description RFC 6901, empty for the whole document; a query parameter as ?name */
                 pointer: string;
                 detail: string;
             }[];
@@ -788,8 +786,10 @@ export interface components {
         /** @description zero stays where it is, one moves in full */
         Region: "zero" | "one";
         IfNoneMatch: string;
-        /** @description What a frame carries beside the positions */
+        /** @description What a frame carries beside the positions, as far as the cloud has it */
         Attributes: ("normal" | "t" | "detail" | "color" | "marks" | "ids")[];
+        /** @description What the frames carry beside the positions, as far as the cloud has it */
+        StreamAttributes: ("normal" | "t" | "detail" | "color" | "marks")[];
     };
     requestBodies: never;
     headers: {
@@ -1354,7 +1354,7 @@ export interface operations {
     previewFrame: {
         parameters: {
             query?: {
-                /** @description What a frame carries beside the positions */
+                /** @description What a frame carries beside the positions, as far as the cloud has it */
                 attributes?: components["parameters"]["Attributes"];
             };
             header?: never;
@@ -1502,7 +1502,7 @@ export interface operations {
                 format?: "ply" | "draco" | "xyz" | "frame";
                 /** @description The level of the hierarchy; the finest where not given */
                 level?: number;
-                /** @description What a frame carries beside the positions */
+                /** @description What a frame carries beside the positions, as far as the cloud has it */
                 attributes?: components["parameters"]["Attributes"];
             };
             header?: {
@@ -1540,8 +1540,8 @@ export interface operations {
     stream: {
         parameters: {
             query?: {
-                /** @description What a frame carries beside the positions */
-                attributes?: components["parameters"]["Attributes"];
+                /** @description What the frames carry beside the positions, as far as the cloud has it */
+                attributes?: components["parameters"]["StreamAttributes"];
             };
             header?: never;
             path: {
