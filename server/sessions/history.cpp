@@ -46,7 +46,7 @@ Result<void> History::move_head(std::size_t edit) {
 void History::trim() {
   // The state that is cheapest to lose goes first: replaying what it spans, weighed by how far from the head
   // it is. So the stored states thin out with their distance, and undoing the last edits stays immediate.
-  while (memory() > budget_bytes_ && states_.size() > 2) {
+  while (memory() > budget_bytes_) {
     auto victim = states_.end();
     double least_cost = 0.0;
     for (auto it = std::next(states_.begin()); it != states_.end(); ++it) {

@@ -250,13 +250,16 @@ void Session::refresh_field() {
   // t for viewers is not urgent: whatever else was asked for goes first.
   if (!strand_.is_idle_behind()) return schedule_field();
   const SharedDocument now = document();
-  const SharedField before = shown_field_;
   if (now->zero.samples > 0 && now->one.samples > 0) {
     (void)ensure_field(std::max(active_level_, now->surface.first_valid_level), Blend::kQuartic);
   } else {
     shown_field_ = nullptr;
   }
-  if (shown_field_ != before && !shows_preview_) show_committed();
+  show_field();
+}
+
+void Session::show_field() {
+  if (!shows_preview_ && display_.picture().field != shown_field_) show_committed();
 }
 
 Outcome<SurfaceState> Session::compute(const EditParams& params) {

@@ -119,6 +119,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void run_preview();
   void schedule_field();
   void refresh_field();
+  void show_field();
   Outcome<Done> check_open() const;
   Outcome<SharedField> ensure_field(std::uint32_t level, Blend blend);
   Outcome<Done> ensure_level(std::uint32_t level);

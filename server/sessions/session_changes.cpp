@@ -161,6 +161,7 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
       auto made =
           ensure_field(std::max(active_level_, document()->surface.first_valid_level), Blend::kQuartic);
       if (made.ok()) field = made.value();  // without usable regions t is 0 everywhere
+      show_field();
     }
     const SharedDocument now = document();
     float range = 0.0F;

@@ -1,0 +1,294 @@
+// The whole way through the real daemon: upload, session, painting, previews, edits, download.
+
+#include <doctest/doctest.h>
+
+#include <csignal>
+#include <set>
+#include <thread>
+
+#include "daemon.h"
+#include "engine/io/cloud_io.h"
+#include "protocol/frames/frame.h"
+#include "protocol/frames/stream_record.h"
+#include "tests/server/raw_client.h"
+#include "tests/server/synthetic.h"
+
+using namespace pointwright;
+using namespace pointwright::test;
+using nlohmann::json;
+
+namespace {
+
+const std::string kLeft = R"({"mode":"add","shape":{"type":"box","min":[-1,-1,-1],"max":[0.2,2,1]}})";
+const std::string kRight = R"({"mode":"add","shape":{"type":"box","min":[0.8,-1,-1],"max":[2,2,1]}})";
+
+std::string translation(double z, const std::string& more = "") {
+  return R"({"level":0,"blend":"quartic","deformation":{"type":"translation","vector":[0,0,)" +
+         std::to_string(z) + "]}" + more + "}";
+}
+
+std::string file_of(const Cloud& cloud, CloudFormat format = CloudFormat::kPly) {
+  const auto file = write_cloud(cloud, format, {});
+  REQUIRE(file.ok());
+  return {reinterpret_cast<const char*>(file.value().data()), file.value().size()};
+}
+
+Cloud cloud_of(const std::string& bytes) {
+  auto read = read_cloud(std::as_bytes(std::span(bytes.data(), bytes.size())), CloudFormat::kPly, {});
+  REQUIRE(read.ok());
+  return in_caller_order(read.value().cloud);
+}
+
+/// Reads a stream's records from a connection.
+class StreamReader {
+ public:
+  StreamReader(const Daemon& daemon, const std::string& target) : client_(daemon.port()) {
+    client_.send("GET " + target + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  }
+  /// The next record within a while; nullopt at the end.
+  std::optional<protocol::StreamRecord> next() {
+    while (true) {
+      auto record = parser_.next();
+      REQUIRE(record.ok());
+      if (record.value()) return record.value();
+      if (!client_.receive_some(raw_, std::chrono::seconds(20))) return std::nullopt;
+      take_chunks();
+    }
+  }
+  /// The next frame, past events.
+  std::optional<protocol::DecodedFrame> next_frame() {
+    while (auto record = next()) {
+      if (record->type != 1) continue;
+      auto frame = protocol::decode_frame(record->payload);
+      REQUIRE(frame.ok());
+      return std::move(frame).value();
+    }
+    return std::nullopt;
+  }
+  static json event(const protocol::StreamRecord& record) {
+    const auto* begin = reinterpret_cast<const char*>(record.payload.data());
+    return json::parse(begin, begin + record.payload.size());
+  }
+  void close() { client_.close(); }
+  RawClient& client() { return client_; }
+
+ private:
+  void take_chunks() {
+    if (!past_head_) {
+      const std::size_t end = raw_.find("\r\n\r\n");
+      if (end == std::string::npos) return;
+      CHECK(status_of(raw_) == 200);
+      raw_.erase(0, end + 4);
+      past_head_ = true;
+    }
+    while (true) {
+      const std::size_t end = raw_.find("\r\n");
+      if (end == std::string::npos) return;
+      const std::size_t size = std::stoul(raw_.substr(0, end), nullptr, 16);
+      if (raw_.size() < end + 2 + size + 2) return;
+      parser_.push(std::as_bytes(std::span(raw_.data() + end + 2, size)));
+      raw_.erase(0, end + 2 + size + 2);
+    }
+  }
+
+  RawClient client_;
+  protocol::StreamRecordParser parser_;
+  std::string raw_;
+  bool past_head_ = false;
+};
+
+}  // namespace
+
+TEST_CASE(
+    "a cloud is uploaded, painted, previewed, edited and downloaded, and what was not touched keeps its "
+    "bits") {
+  Daemon daemon;
+  const Cloud original = wavy_sheet(80);
+  const Reply uploaded = daemon.upload(file_of(original), "application/x-ply", "?name=wavy%20sheet");
+  REQUIRE(uploaded.status == 201);
+  CHECK(uploaded.json()["name"] == "wavy sheet");
+  CHECK(uploaded.json()["sample_count"] == 6400);
+  const std::string session = daemon.open_session(uploaded.json()["id"]);
+
+  REQUIRE(daemon.ask("POST", session + "/regions/zero/operations", kLeft).status == 200);
+  const Reply painted = daemon.ask("POST", session + "/regions/one/operations", kRight);
+  REQUIRE(painted.status == 200);
+  CHECK(painted.json()["changed"] == 16 * 80);
+
+  StreamReader stream(daemon, session + "/stream?attributes=normal,t,marks");
+  auto first = stream.next();
+  REQUIRE(first.has_value());
+  CHECK(StreamReader::event(*first)["event"] == "session");
+  auto frame = stream.next_frame();
+  REQUIRE(frame.has_value());
+  CHECK(frame->header.kind == protocol::FrameKind::kKey);
+
+  for (int i = 1; i <= 20; ++i)
+    CHECK(daemon.ask("PUT", session + "/preview", translation(0.02 * i, ",\"sequence\":" + std::to_string(i)))
+              .status == 204);
+  std::uint64_t last_shown = 0;
+  while (frame && frame->header.sequence != 20) {
+    frame = stream.next_frame();
+    if (!frame) break;
+    CHECK(frame->header.sequence >= last_shown);
+    last_shown = frame->header.sequence;
+  }
+  CHECK(last_shown == 20);
+
+  const Reply now = daemon.get(session);
+  CHECK(now.headers.at("etag") == "\"r2\"");
+  const Reply edit = daemon.ask("POST", session + "/edits", translation(0.4), "If-Match: \"r2\"\r\n");
+  REQUIRE(edit.status == 201);
+  CHECK(edit.headers.at("etag") == "\"r3\"");
+  CHECK(edit.json()["moved_samples"].get<int>() > 16 * 80);
+  while (frame && !(frame->header.sequence == 0 && frame->header.revision == 3)) frame = stream.next_frame();
+  CHECK(frame.has_value());
+
+  const Reply download = daemon.get(session + "/samples?format=ply");
+  REQUIRE(download.status == 200);
+  const Cloud before = in_caller_order(original);
+  const Cloud after = cloud_of(download.body);
+  REQUIRE(after.size() == before.size());
+  CHECK(after.color == before.color);
+  std::size_t kept = 0;
+  std::size_t lifted = 0;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    const Vec3d a = model_position(before, i);
+    const Vec3d b = model_position(after, i);
+    if (a.x() <= 0.2) {
+      CHECK(a == b);
+      ++kept;
+    } else if (a.x() >= 0.8) {
+      CHECK(b.z() - a.z() == doctest::Approx(0.4).epsilon(0.01));
+      ++lifted;
+    }
+  }
+  CHECK(kept == 16 * 80);
+  CHECK(lifted == 16 * 80);
+
+  // Undo brings the upload's own bytes back, redo the edit's.
+  CHECK(daemon.ask("PUT", session + "/head", R"({"edit":0})").status == 200);
+  const Cloud undone = cloud_of(daemon.get(session + "/samples?format=ply").body);
+  CHECK(undone.position == before.position);
+  CHECK(daemon.ask("PUT", session + "/head", R"({"edit":1})").status == 200);
+  CHECK(daemon.get(session + "/samples?format=ply").body == download.body);
+
+  CHECK(daemon.ask("DELETE", session).status == 204);
+  std::optional<protocol::StreamRecord> record;
+  std::optional<protocol::StreamRecord> last;
+  while ((record = stream.next())) last = record;
+  REQUIRE(last.has_value());
+  CHECK(StreamReader::event(*last)["event"] == "end");
+  CHECK(daemon.get(session).status == 404);
+  CHECK(daemon.stop(SIGTERM) == 0);
+}
+
+TEST_CASE("a frame rendered for a tool shows what the same edit would give") {
+  Daemon daemon;
+  const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(40))).json()["id"]);
+  REQUIRE(daemon.ask("PUT", session + "/regions/zero", R"({"operations":[)" + kLeft + "]}").status == 200);
+  REQUIRE(daemon.ask("PUT", session + "/regions/one", R"({"operations":[)" + kRight + "]}").status == 200);
+  const Reply reply =
+      daemon.ask("POST", session + "/preview?attributes=normal,ids", translation(0.3, ",\"sequence\":1"));
+  REQUIRE(reply.status == 200);
+  CHECK(reply.headers.at("content-type") == "application/vnd.pointwright.frame");
+  const auto frame = protocol::decode_frame(std::as_bytes(std::span(reply.body.data(), reply.body.size())));
+  REQUIRE(frame.ok());
+  std::size_t lifted = 0;
+  for (const auto& block : frame.value().blocks)
+    for (const Vec3d& p : protocol::decode_positions(frame.value().header, block))
+      if (p.z() > 0.25) ++lifted;
+  CHECK(lifted > 8 * 40 - 20);
+  CHECK(daemon.get(session).json()["history"]["edits"] == 0);
+}
+
+TEST_CASE("edits without painting, on unknown sessions or with wrong values are refused with problems") {
+  Daemon daemon;
+  const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(20))).json()["id"]);
+  const auto problem = [](const Reply& reply) {
+    return reply.json().value("type", "") + " " + std::to_string(reply.status);
+  };
+  CHECK(problem(daemon.ask("POST", session + "/edits", translation(1), "If-Match: \"r0\"\r\n")) ==
+        "/problems/empty-region 422");
+  CHECK(problem(daemon.ask("POST", session + "/edits", translation(1))) == "/problems/revision-required 428");
+  CHECK(problem(daemon.ask("POST", session + "/edits", "{", "If-Match: \"r0\"\r\n")) ==
+        "/problems/malformed-json 400");
+  CHECK(problem(daemon.ask("POST", session + "/edits",
+                           R"({"level":7,"deformation":{"type":"translation","vector":[0,0,1]}})",
+                           "If-Match: \"r0\"\r\n")) == "/problems/invalid-value 422");
+  CHECK(problem(daemon.get("/v1/sessions/AAAAAAAAAAAAAAAAAAAAAA")) == "/problems/not-found 404");
+  CHECK(problem(daemon.ask("POST", "/v1/sessions", R"({"cloud":"AAAAAAAAAAAAAAAAAAAAAA"})")) ==
+        "/problems/not-found 404");
+  CHECK(problem(daemon.ask("POST", session + "/edits", translation(1),
+                           "If-Match: \"r0\"\r\nOrigin: http://evil.example\r\n")) ==
+        "/problems/origin-not-allowed 403");
+  CHECK(daemon.get(session).headers.at("etag") == "\"r0\"");
+}
+
+TEST_CASE(
+    "two clouds of the same bytes edited the same way give the same bytes, with one thread and with all") {
+  const std::string upload = file_of(wavy_sheet(60));
+  std::set<std::string> results;
+  for (const char* threads : {"1", "0", "0"}) {
+    Daemon daemon({"--threads", threads});
+    const std::string session = daemon.open_session(daemon.upload(upload).json()["id"]);
+    daemon.ask("POST", session + "/regions/zero/operations", kLeft);
+    daemon.ask("POST", session + "/regions/one/operations", kRight);
+    const std::string rotation =
+        R"({"level":0,"deformation":{"type":"rotation","axis":{"point":[0.5,0.5,0],"direction":[0,1,0]},"angle_deg":35}})";
+    REQUIRE(daemon.ask("POST", session + "/edits", rotation, "If-Match: \"r2\"\r\n").status == 201);
+    REQUIRE(daemon.ask("POST", session + "/edits", translation(0.2), "If-Match: \"r3\"\r\n").status == 201);
+    results.insert(daemon.get(session + "/samples?format=ply").body);
+  }
+  CHECK(results.size() == 1);
+}
+
+TEST_CASE("clients that are cut off in mid-stream leave nothing behind") {
+  Daemon daemon;
+  const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(40))).json()["id"]);
+  const std::size_t before = daemon.descriptors();
+  for (int round = 0; round < 5; ++round) {
+    std::vector<std::unique_ptr<StreamReader>> readers;
+    for (int i = 0; i < 12; ++i) {
+      readers.push_back(std::make_unique<StreamReader>(daemon, session + "/stream"));
+      CHECK(readers.back()->next().has_value());
+    }
+    for (auto& reader : readers) reader->close();
+  }
+  for (int i = 0; i < 500 && daemon.descriptors() > before; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  CHECK(daemon.descriptors() <= before);
+  CHECK(daemon.get("/healthz").status == 200);
+}
+
+TEST_CASE("a stop ends open streams with a marked record and exits well") {
+  Daemon daemon;
+  const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(20))).json()["id"]);
+  std::vector<std::unique_ptr<StreamReader>> readers;
+  for (int i = 0; i < 8; ++i) {
+    readers.push_back(std::make_unique<StreamReader>(daemon, session + "/stream"));
+    REQUIRE(readers.back()->next_frame().has_value());
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  CHECK(daemon.stop(SIGTERM) == 0);
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
+  for (auto& reader : readers) {
+    std::optional<protocol::StreamRecord> last;
+    while (auto record = reader->next()) last = record;
+    REQUIRE(last.has_value());
+    CHECK(StreamReader::event(*last) == json{{"event", "end"}, {"reason", "the server is stopping"}});
+  }
+  CHECK(daemon.log().find("\"event\":\"stopped\"") != std::string::npos);
+}
+
+TEST_CASE("a stop while a session builds cancels the building") {
+  Daemon daemon;
+  const Reply cloud = daemon.upload(file_of(wavy_sheet(400)));
+  REQUIRE(cloud.status == 201);
+  REQUIRE(
+      daemon.ask("POST", "/v1/sessions", R"({"cloud":")" + cloud.json()["id"].get<std::string>() + R"("})")
+          .status == 202);
+  const auto begin = std::chrono::steady_clock::now();
+  CHECK(daemon.stop(SIGINT) == 0);
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
+}
