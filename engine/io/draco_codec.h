@@ -17,6 +17,8 @@ inline constexpr const char* kDracoOriginKey =
     "pointwright.origin";  ///< 3 float64: positions are relative to it
 inline constexpr const char* kDracoDoubleKey = "pointwright.position_is_double";  ///< int32: 1
 inline constexpr const char* kDracoNameKey = "name";  ///< of an attribute: the scalar's name
+inline constexpr const char* kDracoTypeKey =
+    "pointwright.type";  ///< of an attribute: "int32" or "uint32" kept as float64
 
 /// A point cloud, or a mesh for its vertices (without its faces). Positions in any numeric type; generic
 /// attributes become scalars, one a component, by the name in their metadata or "generic_<id>". Errors: those

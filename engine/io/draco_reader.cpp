@@ -34,6 +34,7 @@ class ColumnReader {
       const draco::PointAttribute* attribute = cloud_.attribute(id);
       if (attribute == position) continue;
       if (auto done = add(*attribute, names_of(*attribute, id)); !done) return done.error();
+      restore_type(id);
     }
     return std::move(columns_);
   }
@@ -79,6 +80,32 @@ class ColumnReader {
       columns_.push_back(std::move(column));
     }
     return {};
+  }
+
+  // Integers that our writer kept as float64 because libdraco cannot code them.
+  void restore_type(std::int32_t id) {
+    const draco::AttributeMetadata* metadata = cloud_.GetAttributeMetadataByAttributeId(id);
+    std::string type;
+    if (metadata == nullptr || !metadata->GetEntryString(kDracoTypeKey, &type)) return;
+    const auto* doubles = std::get_if<std::vector<double>>(&columns_.back().values);
+    if (doubles == nullptr) return;
+    if (type == "int32") columns_.back().values = as_integers<std::int32_t>(*doubles);
+    if (type == "uint32") columns_.back().values = as_integers<std::uint32_t>(*doubles);
+  }
+
+  // The same values as integers; as they are where one of them is none.
+  template <typename T>
+  static ScalarAttribute::Values as_integers(const std::vector<double>& doubles) {
+    std::vector<T> integers;
+    integers.reserve(doubles.size());
+    for (const double value : doubles) {
+      const bool fits = value >= static_cast<double>(std::numeric_limits<T>::lowest()) &&
+                        value <= static_cast<double>(std::numeric_limits<T>::max()) &&
+                        std::floor(value) == value;
+      if (!fits) return doubles;
+      integers.push_back(static_cast<T>(value));
+    }
+    return integers;
   }
 
   // Every point's value lies inside the attribute's buffer.

@@ -3,7 +3,11 @@
 #include <draco/metadata/geometry_metadata.h>
 #include <draco/point_cloud/point_cloud.h>
 
+#include <algorithm>
+#include <array>
+#include <limits>
 #include <memory>
+#include <type_traits>
 
 #include "engine/io/draco_codec.h"
 
@@ -45,9 +49,10 @@ class CloudBuilder {
     return id;
   }
 
-  void name(int id, const std::string& text) {
+  void describe(int id, const std::string& name, const char* type) {
     auto metadata = std::make_unique<draco::AttributeMetadata>();
-    metadata->AddEntryString(kDracoNameKey, text);
+    metadata->AddEntryString(kDracoNameKey, name);
+    if (type != nullptr) metadata->AddEntryString(kDracoTypeKey, type);
     if (target_.GetMetadata() == nullptr) target_.AddMetadata(std::make_unique<draco::GeometryMetadata>());
     target_.AddAttributeMetadata(id, std::move(metadata));
   }
@@ -113,16 +118,34 @@ void add_standard_columns(const Cloud& cloud, CloudBuilder& builder) {
   }
 }
 
+// libdraco codes integers as differences in 32 signed bits, and fails where they do not fit.
+template <typename T>
+bool spans_too_much(const std::vector<T>& values) {
+  if constexpr (std::is_integral_v<T> && sizeof(T) == 4) {
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
+    return std::int64_t{*high} > kMost || std::int64_t{*high} - std::int64_t{*low} >= kMost;
+  }
+  return false;
+}
+
+template <typename T>
+void add_scalar(const std::vector<T>& values, const std::string& name, CloudBuilder& builder) {
+  constexpr auto kGeneric = draco::GeometryAttribute::GENERIC;
+  if (spans_too_much(values)) {
+    const int wide = builder.add<double>(
+        kGeneric, 1, [&](std::uint32_t i, double* out) { *out = static_cast<double>(values[i]); });
+    builder.describe(wide, name, std::is_signed_v<T> ? "int32" : "uint32");
+    return;
+  }
+  const int id = builder.add<T>(kGeneric, 1, [&](std::uint32_t i, T* out) { *out = values[i]; });
+  builder.describe(id, name, nullptr);
+}
+
 void add_scalars(const ExportView& view, CloudBuilder& builder) {
   for (std::size_t s = 0; s < view.cloud().scalars.size(); ++s) {
-    const int id = std::visit(
-        [&](const auto& values) {
-          using T = typename std::decay_t<decltype(values)>::value_type;
-          return builder.add<T>(draco::GeometryAttribute::GENERIC, 1,
-                                [&](std::uint32_t i, T* out) { *out = values[i]; });
-        },
-        view.cloud().scalars[s].values);
-    builder.name(id, view.scalar_names()[s]);
+    std::visit([&](const auto& values) { add_scalar(values, view.scalar_names()[s], builder); },
+               view.cloud().scalars[s].values);
   }
 }
 

@@ -4,7 +4,9 @@
 #include <cstring>
 #include <limits>
 #include <numeric>
+#include <optional>
 
+#include "engine/core/parallel.h"
 #include "engine/io/decoded_cloud.h"
 #include "engine/spatial/coherent_order.h"
 
@@ -34,27 +36,72 @@ bool is_finite(const Position& p) {
   return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
 }
 
+struct Range {
+  Vec3d min = Vec3d::Constant(std::numeric_limits<double>::max());
+  Vec3d max = Vec3d::Constant(std::numeric_limits<double>::lowest());
+  bool is_finite = true;  // of every coordinate; min and max mean nothing where it is not
+
+  [[nodiscard]] double extent() const { return (max - min).maxCoeff(); }
+  [[nodiscard]] Vec3d farthest() const { return min.cwiseAbs().cwiseMax(max.cwiseAbs()); }
+  friend Range operator+(const Range& a, const Range& b) {
+    return {a.min.cwiseMin(b.min), a.max.cwiseMax(b.max), a.is_finite && b.is_finite};
+  }
+};
+
+// Least, greatest, and whether all are finite: x * 0 is 0 for these alone.
+void extend(const float* values, std::size_t begin, std::size_t end, Eigen::Index axis, Range& range) {
+  float low = values[begin];
+  float high = low;
+  float zero = 0.0F;
+  for (std::size_t i = begin; i < end; ++i) {
+    low = std::min(low, values[i]);
+    high = std::max(high, values[i]);
+    zero += values[i] * 0.0F;
+  }
+  range.min[axis] = static_cast<double>(low);
+  range.max[axis] = static_cast<double>(high);
+  range.is_finite = range.is_finite && zero == 0.0F;
+}
+
+Range range_of(const Cloud& cloud) {
+  const bool is_plain_float = cloud.exact_position.empty() && cloud.origin.isZero(0.0);
+  return parallel_sum<Range>(cloud.size(), Range{}, [&](std::size_t begin, std::size_t end) {
+    Range range;
+    if (is_plain_float) {
+      extend(cloud.position.x(), begin, end, 0, range);
+      extend(cloud.position.y(), begin, end, 1, range);
+      extend(cloud.position.z(), begin, end, 2, range);
+      return range;
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      const Position p = file_position(cloud, i);
+      const Vec3d v(p[0], p[1], p[2]);
+      range.min = range.min.cwiseMin(v);
+      range.max = range.max.cwiseMax(v);
+      range.is_finite = range.is_finite && is_finite(p);
+    }
+    return range;
+  });
+}
+
+// There is such a sample: refuses, or leaves the cloud without them.
 Result<void> drop_or_refuse_non_finite(ImportedCloud& imported, const ImportParams& params) {
   Cloud& cloud = imported.cloud;
   std::vector<std::uint32_t> finite;
-  std::size_t first_bad = cloud.size();
+  std::optional<std::size_t> first_bad;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const bool good = is_finite(file_position(cloud, i));
-    if (!good && first_bad == cloud.size()) {
-      first_bad = i;
-      finite.resize(i);
-      std::iota(finite.begin(), finite.end(), 0U);
-    } else if (good && first_bad < cloud.size()) {
+    if (is_finite(file_position(cloud, i))) {
       finite.push_back(static_cast<std::uint32_t>(i));
+    } else if (!first_bad) {
+      first_bad = i;
     }
   }
-  if (first_bad == cloud.size()) return {};
   const std::size_t count = cloud.size() - finite.size();
   if (!params.drop_non_finite) {
     return Error{.code = ErrorCode::kNonFinite,
                  .message = std::to_string(count) + " of " + std::to_string(cloud.size()) +
                             " samples have a coordinate that is not finite; the first is sample " +
-                            std::to_string(first_bad),
+                            std::to_string(first_bad.value_or(0)),
                  .field = "position",
                  .limit = 0.0,
                  .actual = static_cast<double>(count)};
@@ -67,24 +114,6 @@ Result<void> drop_or_refuse_non_finite(ImportedCloud& imported, const ImportPara
   std::iota(cloud.id.begin(), cloud.id.end(), 0U);
   imported.report.dropped_non_finite = count;
   return {};
-}
-
-struct Range {
-  Vec3d min = Vec3d::Constant(std::numeric_limits<double>::max());
-  Vec3d max = Vec3d::Constant(std::numeric_limits<double>::lowest());
-  [[nodiscard]] double extent() const { return (max - min).maxCoeff(); }
-  [[nodiscard]] Vec3d farthest() const { return min.cwiseAbs().cwiseMax(max.cwiseAbs()); }
-};
-
-Range range_of(const Cloud& cloud) {
-  Range range;
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const Position p = file_position(cloud, i);
-    const Vec3d v(p[0], p[1], p[2]);
-    range.min = range.min.cwiseMin(v);
-    range.max = range.max.cwiseMax(v);
-  }
-  return range;
 }
 
 Result<void> check_range(const Range& range, bool is_double) {
@@ -139,20 +168,25 @@ void recentre(Cloud& cloud, const Range& range) {
   const bool is_plain_float = cloud.exact_position.empty() && cloud.origin.isZero(0.0);
   if (is_plain_float && origin.isZero(0.0)) return;
   std::vector<Position> exact(cloud.size());
-  for (std::size_t i = 0; i < cloud.size(); ++i) exact[i] = file_position(cloud, i);
+  parallel_for(cloud.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      exact[i] = file_position(cloud, i);
+      const Vec3d p(exact[i][0], exact[i][1], exact[i][2]);
+      // At origin 0 the cast alone keeps a negative zero.
+      cloud.position.set(i, Vec3d((origin.array() == 0.0).select(p, p - origin)).cast<float>());
+    }
+  });
   cloud.origin = origin;
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const Vec3d p(exact[i][0], exact[i][1], exact[i][2]);
-    // At origin 0 the cast alone keeps a negative zero.
-    cloud.position.set(i, Vec3d((origin.array() == 0.0).select(p, p - origin)).cast<float>());
-  }
   cloud.exact_position.clear();
-  bool is_exact = true;
-  for (std::size_t i = 0; is_exact && i < cloud.size(); ++i) {
-    const Position again = file_position(cloud, i);
-    is_exact = std::memcmp(again.data(), exact[i].data(), sizeof(Position)) == 0;
-  }
-  if (!is_exact) cloud.exact_position = std::move(exact);
+  const auto changed = parallel_sum<std::size_t>(cloud.size(), 0, [&](std::size_t begin, std::size_t end) {
+    std::size_t count = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Position again = file_position(cloud, i);
+      if (std::memcmp(again.data(), exact[i].data(), sizeof(Position)) != 0) ++count;
+    }
+    return count;
+  });
+  if (changed > 0) cloud.exact_position = std::move(exact);
 }
 
 // After coherent ordering equal float positions are adjacent; equal exact ones may be parted by others of the
@@ -208,8 +242,11 @@ Result<ImportedCloud> finish_cloud(ImportedCloud decoded, const ImportParams& pa
     return Error{
         .code = ErrorCode::kNonFinite, .message = "the file's origin is not finite", .field = "origin"};
   }
-  if (auto finite = drop_or_refuse_non_finite(imported, params); !finite) return finite.error();
-  const Range range = range_of(cloud);
+  Range range = range_of(cloud);
+  if (!range.is_finite) {
+    if (auto finite = drop_or_refuse_non_finite(imported, params); !finite) return finite.error();
+    range = range_of(cloud);
+  }
   const bool is_double = cloud.position_is_double || !cloud.origin.isZero(0.0);
   if (auto checked = check_range(range, is_double); !checked) return checked.error();
   recentre(cloud, range);

@@ -133,7 +133,7 @@ class XyzReader {
   // The lines before the first row: a count, then names. True where the line was one of them.
   Result<bool> take_heading(const TextLine& line) {
     std::uint64_t count = 0;
-    if (fields_.size() == 1 && !declared_ && names_.empty() && parse_integer(fields_[0], count)) {
+    if (fields_.size() == 1 && !declared_ && !has_names_line_ && parse_integer(fields_[0], count)) {
       // A row takes six characters at least, the last one five.
       if (count > params_.max_samples) return too_large(count);
       if (count > (text_.size() + 1) / 6) {

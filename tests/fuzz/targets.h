@@ -1,0 +1,15 @@
+#pragma once
+// One function per fuzzing target: takes any bytes, throws or stops on a broken promise. The libFuzzer
+// programs call one each; the corpus replay test calls them all.
+
+#include <cstddef>
+#include <span>
+
+namespace pointwright::fuzz {
+
+void try_draco(std::span<const std::byte> bytes);  ///< the gate, then the decoder behind it, then finishing
+void try_ply(std::span<const std::byte> bytes);    ///< reader, finishing, and writer and reader again
+void try_xyz(std::span<const std::byte> bytes);    ///< the same
+void try_cloud_blob(std::span<const std::byte> bytes);  ///< the daemon's side of the confined decoder
+
+}  // namespace pointwright::fuzz
