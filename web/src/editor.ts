@@ -55,6 +55,7 @@ export function createEditor(
   root.append(stage);
   const viewport = new Viewport(stage);
   viewport.setSpacing(document.spacing, document.sample_count);
+  viewport.setPatient(!link.ui);
   const display = displayFromLink(link.mode, loadDisplay());
   viewport.setDisplay(display);
 

@@ -13,6 +13,7 @@ export interface ViewerStatus {
 
 export interface ViewerHook {
   readonly status: ViewerStatus;
+  /** In model space. */
   camera: CameraState;
 }
 

@@ -5,6 +5,8 @@ import type { Notices, Questions } from "./event-map";
 import { Events } from "./events";
 import { installHook, type ViewerStatus } from "./hook";
 import { readLink } from "./link";
+import type { Vec3 } from "./math/vec3";
+import type { CameraState } from "./scene/camera-math";
 import { showHome } from "./ui/home";
 import { createProgress } from "./ui/progress";
 import { createToasts } from "./ui/toasts";
@@ -61,12 +63,21 @@ async function main(): Promise<void> {
         lastSequence: editor.source.last?.sequence ?? 0,
         idle: editor.loaded() && editor.queue.length === 0 && editor.viewport.idle,
       }),
-      { get: () => editor.viewport.rig.state, set: (camera) => editor.viewport.rig.setState(camera) },
+      {
+        get: () => mapCamera(editor.viewport.rig.state, (point) => editor.store.toModel(point)),
+        set: (camera) =>
+          editor.viewport.rig.setState(mapCamera(camera, (point) => editor.store.toScene(point))),
+      },
     );
   } catch (error) {
     state = "failed";
     progress.fail({ ...problemOf(error), title: "This browser cannot draw the surface" });
   }
+}
+
+/** A camera in other coordinates that differ by a translation. */
+function mapCamera(camera: CameraState, map: (point: Vec3) => Vec3): CameraState {
+  return { position: map(camera.position), target: map(camera.target), up: camera.up };
 }
 
 /** Waits while the session is being built; the server tells how far it is. */

@@ -25,6 +25,7 @@ export interface PacerStep {
 
 const REFINEMENTS = 16;
 const LEAST_REFINEMENTS = 4;
+const LEAST_PATIENT_REFINEMENTS = 10;
 const REFINEMENT_MS = 1200;
 const REST_MS = 110;
 const LEAST_BUDGET = 30_000;
@@ -37,6 +38,8 @@ const QUICK_MS = 22;
  * rest the whole surface is drawn, then accumulated over sub-pixel offsets until edges are smooth, then nothing is drawn.
  */
 export class Pacer {
+  /** Refine further on slow machines too: for pictures that nobody waits at. */
+  patient = false;
   private changed_ = true;
   private index_ = 0;
   private partial_ = false;
@@ -95,7 +98,8 @@ export class Pacer {
 
   private done(now: number): boolean {
     if (this.index_ >= REFINEMENTS - 1) return true;
-    return this.index_ >= LEAST_REFINEMENTS && this.restSince_ > 0 && now - this.restSince_ > REFINEMENT_MS;
+    const least = this.patient ? LEAST_PATIENT_REFINEMENTS : LEAST_REFINEMENTS;
+    return this.index_ >= least && this.restSince_ > 0 && now - this.restSince_ > REFINEMENT_MS;
   }
 
   /** A picture of `drawn` of `samples` samples took `ms` on the GPU: the next ones while things move are cut to fit. */

@@ -15,6 +15,9 @@ import { setResidual, setUniform, vectorUniform } from "./uniforms";
 /** Pixels that the targets hold at most; beyond, the picture is drawn at a lower ratio and scaled up. */
 const MAX_PIXELS = 8_500_000;
 
+/** Splat radius in spacings (the root of the area that a sample stands for): closes scans that are not quite even. */
+const SPLAT_SPACINGS = 1.45;
+
 export interface BrushRing {
   position: Vec3;
   radius: number;
@@ -106,6 +109,11 @@ export class Viewport {
       this.timer_ === 0 &&
       this.pacer_.settled
     );
+  }
+
+  /** Draws for pictures that nobody waits at. */
+  setPatient(patient: boolean): void {
+    this.pacer_.patient = patient;
   }
 
   get loadedSamples(): number {
@@ -255,7 +263,11 @@ export class Viewport {
     // Fewer samples stand wider apart: their discs grow so that the surface stays closed.
     const shown = surface ? Math.max(1, Math.min(prefix.samples, Math.max(surface.loadedSamples, 1))) : 1;
     const sparse = Math.sqrt(Math.max(1, this.fullSamples_) / shown);
-    setUniform(splat, "splatRadius", this.spacing_ * 1.2 * Math.max(1, sparse) * this.display_.splatSize);
+    setUniform(
+      splat,
+      "splatRadius",
+      this.spacing_ * SPLAT_SPACINGS * Math.max(1, sparse) * this.display_.splatSize,
+    );
     setUniform(shade, "turn", index * 0.61);
     camera.setViewOffset(width, height, jitter[0], jitter[1], width, height);
     setUniform(splat, "pixelScale", height * 0.5 * camera.projectionMatrix.elements[5]);

@@ -73,7 +73,7 @@ float occlusion(vec2 pixel, vec3 at, vec3 n, mat2 spin) {
     float size = length(to);
     sum += max(0.0, dot(n, to) / max(size, 1e-12) - 0.12) * smoothstep(2.2 * reach, 0.3 * reach, size);
   }
-  return clamp(1.0 - 1.75 * sum / 10.0, 0.0, 1.0);
+  return clamp(1.0 - 2.3 * sum / 10.0, 0.0, 1.0);
 }
 
 vec3 background(vec2 uv) {
@@ -97,12 +97,12 @@ void main() {
     float open = edl > 0.0 ? occlusion(pixel, at, n, spin) : 1.0;
     vec3 up = normalize(mat3(viewMatrix) * vec3(0.0, 1.0, 0.0));
     float sky = dot(n, up) * 0.5 + 0.5;
-    vec3 ambient = mix(vec3(0.115, 0.108, 0.105), vec3(0.30, 0.325, 0.365), sky) * open;
+    vec3 ambient = mix(vec3(0.085, 0.078, 0.075), vec3(0.225, 0.248, 0.285), sky) * open;
     float key = max(0.0, dot(n, KEY));
     float fill = max(0.0, dot(n, FILL));
     float edge = pow(1.0 - max(0.0, dot(n, eye)), 3.0);
     float rim = edge * max(0.0, dot(n, RIM) + 0.55);
-    vec3 light = ambient + vec3(1.02, 0.975, 0.90) * key * mix(0.72, 1.0, open) + vec3(0.20, 0.245, 0.31) * fill;
+    vec3 light = ambient + vec3(1.06, 1.0, 0.91) * key * mix(0.62, 1.0, open) + vec3(0.15, 0.19, 0.25) * fill;
     float shine = pow(max(0.0, dot(n, normalize(KEY + eye))), 34.0) * 0.085;
     vec3 lit = base * light + (vec3(0.30, 0.36, 0.44) * rim * 0.55 + shine) * open;
     vec3 plain = base * (0.42 + 0.58 * mix(max(0.0, dot(n, eye)), key, 0.35)) * mix(0.7, 1.0, open);
@@ -192,6 +192,3 @@ void main() {
   outColor = vec4(color, 1.0);
 }
 `;
-
-/** The mask's or the picture's bare copy. */
-export const SCREEN_PREFIX = "precision highp float;\n";
