@@ -4,18 +4,23 @@
 #include "engine/smoothing/umbrella.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
 #include <vector>
 
 #include "engine/core/parallel.h"
+#include "engine/normals/plane_fit.h"
 
 namespace pointwright {
 namespace {
 
 constexpr float kLambda = 0.5F;
+// The variance no longer grows where a step adds less than this part of what the first one did.
+constexpr double kExhausted = 0.01;
+// Bounds of a sample's part of lambda = 0.5: plain steps are stable up to 1.2.
+constexpr double kLeastRate = 0.25;
+constexpr double kGreatestRate = 1.6;
 
 // Normalised umbrella weights per neighbour, in the graph's layout; empty for uniform ones.
 std::vector<float> rest_weights(const Points& points, const NeighborGraph& graph) {
@@ -77,44 +82,130 @@ Vec3f umbrella(const Points& points, const NeighborGraph& graph, const std::vect
   return sum;
 }
 
-// Double-precision columns of the calibration: |p|^2 and p under the same steps as the samples.
-struct Moments {
-  std::array<std::vector<double>, 4> column;  // x y z |p|^2
-
-  Moments(const Points& points, const Vec3f& center) {
-    for (auto& c : column) c.resize(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Vec3d p = (points[i] - center).cast<double>();
-      for (std::size_t axis = 0; axis < 3; ++axis) column[axis][i] = p[static_cast<Eigen::Index>(axis)];
-      column[3][i] = p.squaredNorm();
+// Mean squared distance to the neighbours: lambda times this is the variance that a step adds to a sample's
+// weights.
+std::vector<double> mean_squares(const Points& points, const NeighborGraph& graph) {
+  std::vector<double> result(points.size());
+  parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      double sum = 0.0;
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        sum += static_cast<double>((points[graph.index(i, j)] - points[i]).squaredNorm());
+      }
+      result[i] = sum / static_cast<double>(graph.k);
     }
+  });
+  return result;
+}
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Of each sample's lambda: what makes steps mean the same where samples are dense and where they are sparse.
+std::vector<double> step_rates(const std::vector<double>& gain, const NeighborGraph& graph) {
+  std::vector<double> smooth_gain(gain.size());  // a single sample's own gain scatters too much
+  for (std::size_t i = 0; i < gain.size(); ++i) {
+    double sum = gain[i];
+    for (std::uint32_t j = 0; j < graph.k; ++j) sum += gain[graph.index(i, j)];
+    smooth_gain[i] = sum / static_cast<double>(graph.k + 1);
   }
-  void step(const NeighborGraph& graph, double lambda) {
-    for (auto& c : column) {
+  const double middle = median_of(smooth_gain);
+  std::vector<double> rate(gain.size(), 1.0);
+  for (std::size_t i = 0; i < gain.size(); ++i) {
+    if (smooth_gain[i] > 0.0) rate[i] = std::clamp(middle / smooth_gain[i], kLeastRate, kGreatestRate);
+  }
+  return rate;
+}
+
+// The variance that the steps have given to the weights of each sample's neighbourhood, in double precision.
+//
+// Free steps: rows of W^n; |p|^2 and p under the same steps give it about the mean, and samples drift to that
+// mean. Steps along the normals leave out the drift: a step adds its gain, about the sample itself, and
+// carries on what the neighbours have. On random samplings the two differ by a third, hence each direction
+// has its own.
+class KernelVariance {
+ public:
+  KernelVariance(const Points& points, const NeighborGraph& graph, SmoothingDirection direction)
+      : graph_(&graph), is_free_(direction == SmoothingDirection::kFree), columns_(is_free_ ? 4 : 1) {
+    for (auto& c : columns_) c.resize(points.size());
+    if (!is_free_) {
+      gain_ = mean_squares(points, graph);
+      rate_ = step_rates(gain_, graph);
+      return;
+    }
+    const Box3f box = bounds_of(points);
+    const Vec3f center = 0.5F * (box.min + box.max);
+    for_each_sample([&](std::size_t i) {
+      const Vec3d p = (points[i] - center).cast<double>();
+      for (std::size_t axis = 0; axis < 3; ++axis) columns_[axis][i] = p[static_cast<Eigen::Index>(axis)];
+      columns_[3][i] = p.squaredNorm();
+    });
+  }
+
+  // A sample's part of a step's lambda.
+  [[nodiscard]] double rate(std::size_t i) const { return is_free_ ? 1.0 : rate_[i]; }
+
+  void step(double lambda) {
+    for (auto& c : columns_) {
       std::vector<double> next(c.size());
-      parallel_for(c.size(), [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-          double sum = 0.0;
-          for (std::uint32_t j = 0; j < graph.k; ++j) sum += c[graph.index(i, j)];
-          next[i] = c[i] + lambda * (sum / static_cast<double>(graph.k) - c[i]);
-        }
+      for_each_sample([&](std::size_t i) {
+        double sum = 0.0;
+        for (std::uint32_t j = 0; j < graph_->k; ++j) sum += c[graph_->index(i, j)];
+        const double gain = is_free_ ? 0.0 : gain_[i];
+        next[i] = c[i] + lambda * rate(i) * (sum / static_cast<double>(graph_->k) - c[i] + gain);
       });
       c.swap(next);
     }
   }
-  // Median over the samples of the per-axis kernel variance, var_i / 2 on a surface.
-  [[nodiscard]] double median_variance() const {
-    std::vector<double> variance(column[0].size());
-    for (std::size_t i = 0; i < variance.size(); ++i) {
-      double mean_sq = 0.0;
-      for (std::size_t axis = 0; axis < 3; ++axis) mean_sq += column[axis][i] * column[axis][i];
-      variance[i] = 0.5 * std::max(0.0, column[3][i] - mean_sq);
+
+  // Median over the samples of the variance per axis, half of the whole on a surface.
+  [[nodiscard]] double median() const {
+    std::vector<double> variance = columns_.back();
+    if (is_free_) {
+      for_each_sample([&](std::size_t i) {
+        for (std::size_t axis = 0; axis < 3; ++axis) variance[i] -= columns_[axis][i] * columns_[axis][i];
+      });
     }
-    const auto middle = variance.begin() + static_cast<std::ptrdiff_t>(variance.size() / 2);
-    std::nth_element(variance.begin(), middle, variance.end());
-    return *middle;
+    return 0.5 * std::max(0.0, median_of(std::move(variance)));
   }
+
+ private:
+  template <typename Body>
+  void for_each_sample(Body body) const {
+    parallel_for(graph_->count, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) body(i);
+    });
+  }
+
+  const NeighborGraph* graph_;
+  bool is_free_;
+  std::vector<std::vector<double>> columns_;  // x y z |p|^2; or the variance itself
+  std::vector<double> gain_, rate_;           // along the normals
 };
+
+// Normals of the smoothed samples, on the side of the old ones, which stay where the neighbours span no
+// plane.
+void refit_normals(const Points& points, const NeighborGraph& graph, Points& normals) {
+  Points fitted(points.size());
+  parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      PlaneFit fit;
+      fit.add(0.0, 0.0, 0.0, 1.0);
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        const Vec3d e = (points[graph.index(i, j)] - points[i]).cast<double>();
+        fit.add(e.x(), e.y(), e.z(), 1.0);
+      }
+      const Vec3d before = normals[i].cast<double>();
+      Vec3d n;
+      if (!fit.normal(n)) n = before;
+      fitted.set(i, (n.dot(before) < 0.0 ? Vec3d(-n) : n).cast<float>());
+    }
+  });
+  normals = std::move(fitted);
+}
 
 void add_step(const Points& change, SmoothingDirection direction, const Points& normals, Points& points) {
   parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
@@ -196,40 +287,49 @@ Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& norm
                  .message = "the smoothing scale must be finite and not negative",
                  .field = "scale"};
   }
+  POINTWRIGHT_CHECK(graph.count == points.size(), "the graph must be of these points");
+  POINTWRIGHT_CHECK(direction == SmoothingDirection::kFree || normals.size() == points.size(),
+                    "smoothing along the normals needs them");
   ScaledSmoothing result{.points = points};
   const double goal = static_cast<double>(scale) * static_cast<double>(scale);
   if (graph.k == 0 || goal == 0.0) return result;
-  const Box3f box = bounds_of(points);
-  const Vec3f center = 0.5F * (box.min + box.max);
-  Moments moments(points, center);
+  KernelVariance variance(points, graph, direction);
+  Points current = normals;
+  Points change(points.size());
   double reached = 0.0;
-  double stalled_at = -1.0;
+  double first_gain = 0.0;
   while (reached < goal * (1.0 - 1e-3)) {
     if (context != nullptr && context->is_cancelled()) return cancelled_error();
-    if (result.iterations == kMaxIterations || reached <= stalled_at) {
+    if (result.iterations == kMaxIterations) {
       return Error{.code = ErrorCode::kInvalidArgument,
                    .message = "the smoothing scale is out of reach of iteration at this density",
                    .field = "scale",
                    .limit = std::sqrt(reached),
                    .actual = static_cast<double>(scale)};
     }
-    Moments trial = moments;
-    trial.step(graph, static_cast<double>(kLambda));
-    const double next = trial.median_variance();
+    KernelVariance trial = variance;
+    trial.step(static_cast<double>(kLambda));
+    const double next = trial.median();
+    if (result.iterations == 0) first_gain = next;
+    if (next - reached <= kExhausted * first_gain) break;
     float lambda = kLambda;
     if (next > goal) {  // the last step: variance grows in proportion to lambda
       lambda = kLambda * static_cast<float>((goal - reached) / (next - reached));
-      trial = moments;
-      trial.step(graph, static_cast<double>(lambda));
+      trial = variance;
+      trial.step(static_cast<double>(lambda));
     }
-    UmbrellaParams params{.direction = direction, .lambda = lambda, .iterations = 1};
-    auto smoothed = smooth(result.points, normals, graph, params, context);
-    if (!smoothed) return smoothed.error();
-    result.points = std::move(smoothed).value();
-    moments = std::move(trial);
+    if (direction == SmoothingDirection::kAlongNormal && result.iterations > 0) {
+      refit_normals(result.points, graph, current);
+    }
+    parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        change.set(i, lambda * static_cast<float>(variance.rate(i)) * umbrella(result.points, graph, {}, i));
+      }
+    });
+    add_step(change, direction, current, result.points);
+    variance = std::move(trial);
     ++result.iterations;
-    stalled_at = reached;
-    reached = moments.median_variance();
+    reached = variance.median();
   }
   result.scale = static_cast<float>(std::sqrt(reached));
   return result;

@@ -49,13 +49,18 @@ Result<Points> smooth(const Points& points, const Points& normals, const Neighbo
                       const UmbrellaParams& params, const ExecutionContext* context = nullptr);
 
 /// Smooths to a scale: iterates plain uniform umbrella steps until the median over all samples of the
-/// kernel's standard deviation s_i reaches `scale`, the last step weakened to meet it. s_i^2 = var_i / 2 with
-/// var_i = (W^n |p|^2)_i - |(W^n p)_i|^2 over the rest positions: the variance of the weights that n steps
-/// have given to the neighbourhood, so the scale means the same at every density and on uneven samplings.
+/// kernel's standard deviation s_i reaches `scale`, the last step weakened to meet it. s_i^2 is half the
+/// variance of the weights that the steps have given to the rest neighbourhood of sample i, so the scale
+/// means the same at every density and on uneven samplings.
+///   kFree: var_i = (W^n |p|^2)_i - |(W^n p)_i|^2.
+///   kAlongNormal: samples do not drift, so the variance is that about the sample; dense samples take smaller
+///   steps, sparse ones larger, so that every s_i is near the median; the normals are fitted anew, on their
+///   old sides, before each step but the first.
+/// A cloud that is too small for the scale is smoothed until nothing changes any more.
 struct ScaledSmoothing {
   Points points;
   std::uint32_t iterations = 0;
-  float scale = 0.0F;  ///< the median reached, model units
+  float scale = 0.0F;  ///< the median reached, model units; less than asked for where the cloud is too small
 };
 /// Errors: kInvalidArgument (scale not finite or < 0; more than 10,000 iterations needed), kCancelled
 Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& normals,
