@@ -36,8 +36,8 @@ void store(std::byte* out, const T& value) {
 template <typename T>
 struct UninitialisedAllocator : std::allocator<T> {
   template <typename U>
-  struct rebind {
-    using other = UninitialisedAllocator<U>;
+  struct rebind {                             // NOLINT(readability-identifier-naming): the standard's name
+    using other = UninitialisedAllocator<U>;  // NOLINT(readability-identifier-naming)
   };
   template <typename U>
   void construct(U* place) noexcept(std::is_nothrow_default_constructible_v<U>) {

@@ -51,10 +51,10 @@ struct JsonErrors {
 template <typename T>
 class [[nodiscard]] Parsed {
  public:
-  Parsed(T value)
-      : state_(std::in_place_index<0>, std::move(value)) {}  // NOLINT(google-explicit-constructor)
-  Parsed(JsonErrors errors)
-      : state_(std::in_place_index<1>, std::move(errors)) {  // NOLINT(google-explicit-constructor)
+  // NOLINTNEXTLINE(google-explicit-constructor): a parser just returns the one or the other
+  Parsed(T value) : state_(std::in_place_index<0>, std::move(value)) {}
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  Parsed(JsonErrors errors) : state_(std::in_place_index<1>, std::move(errors)) {
     POINTWRIGHT_CHECK(!std::get<1>(state_).empty(), "a refusal without a reason");
   }
 
