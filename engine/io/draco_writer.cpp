@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <type_traits>
@@ -40,11 +41,12 @@ class CloudBuilder {
     shape.Init(kind, nullptr, components, data_type_of<T>(), false, stride, 0);
     const int id =
         target_.AddAttribute(shape, true, static_cast<draco::AttributeValueIndex::ValueType>(view_.size()));
-    draco::PointAttribute& attribute = *target_.attribute(id);
+    std::uint8_t* out = target_.attribute(id)->GetAddress(draco::AttributeValueIndex(0));
     std::array<T, 4> values{};
-    for (std::uint32_t row = 0; row < view_.size(); ++row) {
+    for (std::size_t row = 0; row < view_.size(); ++row) {
       put(view_.sample(row), values.data());
-      attribute.SetAttributeValue(draco::AttributeValueIndex(row), values.data());
+      std::memcpy(out, values.data(), static_cast<std::size_t>(stride));
+      out += stride;
     }
     return id;
   }

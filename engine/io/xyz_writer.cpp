@@ -25,6 +25,8 @@ std::string heading(const ExportView& view) {
 std::vector<std::byte> write_xyz(const ExportView& view) {
   const Cloud& cloud = view.cloud();
   std::string text = heading(view);
+  constexpr std::size_t kUsualRow = 48;
+  text.reserve(text.size() + view.size() * kUsualRow);
   const auto put = [&](auto value) {
     if constexpr (std::is_floating_point_v<decltype(value)>) {
       append_number(text, value);
