@@ -59,8 +59,9 @@ export function numberField(label: string, value: number, options: NumberOptions
     },
     set(next: number) {
       current = next;
-      // The hand that types is not interrupted.
-      if (document.activeElement !== input) input.value = roundForShow(next);
+      // The hand that types is not interrupted: "30." stays as it is while it means 30.
+      const typing = document.activeElement === input && Number(input.value.replace(",", ".")) === next;
+      if (!typing) input.value = roundForShow(next);
       input.setAttribute("aria-invalid", "false");
     },
   };

@@ -1,0 +1,160 @@
+// What the browser tests share: a synthetic cloud, a daemon of their own with the built viewer, a page that is watched.
+import { existsSync } from "node:fs";
+import { createRequire } from "node:module";
+import { dirname, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+import { startDaemon } from "../../web/demo/daemon.mjs";
+import { launchBrowser, waitForIdle } from "../../web/scripts/browser.mjs";
+
+export const root = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
+export const waitMs = 240_000;
+
+const fromWeb = createRequire(resolve(root, "web/package.json"));
+export const axePath = fromWeb.resolve("axe-core/axe.min.js");
+
+/** A capsule along x with bumps, as a binary PLY: `count` samples, evenly spread. */
+export function capsulePly(count) {
+  const header = `ply\nformat binary_little_endian 1.0\nelement vertex ${count}\nproperty float x\nproperty float y\nproperty float z\nend_header\n`;
+  const body = Buffer.alloc(12 * count);
+  const golden = Math.PI * (3 - Math.sqrt(5));
+  for (let i = 0; i < count; i++) {
+    // The capsule of radius 0.4 about the segment from x = -0.8 to 0.8, cut into equal areas along x.
+    const x = -1.2 + (2.4 * (i + 0.5)) / count;
+    const off = Math.max(0, Math.abs(x) - 0.8);
+    const radius = Math.sqrt(Math.max(0, 0.16 - off * off)) * (1 + 0.012 * Math.sin(25 * x) * Math.sin(6 * golden * i));
+    body.writeFloatLE(x, 12 * i);
+    body.writeFloatLE(radius * Math.cos(golden * i), 12 * i + 4);
+    body.writeFloatLE(radius * Math.sin(golden * i), 12 * i + 8);
+  }
+  return Buffer.concat([Buffer.from(header, "latin1"), body]);
+}
+
+/** A JSON answer of the daemon; throws where it refuses. */
+export async function json(url, init) {
+  const response = await fetch(url, init);
+  if (!response.ok) throw new Error(`${init?.method ?? "GET"} ${url}: ${response.status} ${await response.text()}`);
+  return response.json();
+}
+
+export async function startService() {
+  const dist = resolve(root, "web/dist");
+  if (!existsSync(resolve(dist, "index.html"))) throw new Error("web/dist is not built");
+  return startDaemon(["--web", dist]);
+}
+
+/** A session of a synthetic capsule, ready. */
+export async function createSession(service, count = 12_000) {
+  const cloud = await json(`${service.url}/v1/clouds?name=capsule.ply`, {
+    method: "POST",
+    headers: { "Content-Type": "application/x-ply" },
+    body: capsulePly(count),
+  });
+  const session = await json(`${service.url}/v1/sessions`, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ cloud: cloud.id, name: "Capsule" }),
+  });
+  const ends = Date.now() + waitMs;
+  for (;;) {
+    const now = await json(`${service.url}/v1/sessions/${session.id}`);
+    if (now.state === "ready") return now;
+    if (now.state === "failed" || Date.now() > ends) throw new Error(`the session is ${now.state}`);
+    await new Promise((done) => setTimeout(done, 100));
+  }
+}
+
+/** The browser, and pages that collect what went wrong on them. */
+export async function openBrowser() {
+  const browser = await launchBrowser();
+  const open = async (url, size = { width: 900, height: 620 }) => {
+    const page = await browser.newPage({ viewport: size, reducedMotion: "reduce", acceptDownloads: true });
+    page.setDefaultTimeout(waitMs);
+    const troubles = [];
+    page.on("pageerror", (error) => troubles.push(`error: ${error.message}`));
+    page.on("console", (message) => {
+      if (message.type() === "error") troubles.push(`console: ${message.text()}`);
+    });
+    await page.addInitScript(() => {
+      globalThis.violations = [];
+      document.addEventListener("securitypolicyviolation", (event) => {
+        globalThis.violations.push(`${event.violatedDirective} ${event.blockedURI}`);
+      });
+    });
+    await page.goto(url);
+    return { page, troubles };
+  };
+  return { browser, open };
+}
+
+export function sessionUrl(service, session, hash = "") {
+  return `${service.url}/?session=${session.id}${hash}`;
+}
+
+/** Waits until the viewer shows at least `revision` and rests. */
+export async function waitForRevision(page, revision) {
+  await page.waitForFunction((wanted) => globalThis.pointwright?.status.revision >= wanted, revision, { timeout: waitMs });
+  await waitForIdle(page, waitMs);
+}
+
+/** Places on the canvas by fractions of it. */
+export async function canvasPlace(page) {
+  const box = await page.locator("canvas.viewport-canvas").boundingBox();
+  return (u, v) => [box.x + u * box.width, box.y + v * box.height];
+}
+
+/** Drags the mouse along places of the canvas. */
+export async function drag(page, places, steps = 4) {
+  const at = await canvasPlace(page);
+  const [first, ...rest] = places;
+  await page.mouse.move(...at(...first));
+  await page.mouse.down();
+  for (const place of rest) await page.mouse.move(...at(...place), { steps });
+  await page.mouse.up();
+}
+
+/** What the canvas shows, counted in the browser: blue, red and surface pixels, and the surface's extent in fractions. */
+export async function countPixels(page) {
+  const shot = await page.locator("canvas.viewport-canvas").screenshot({ timeout: waitMs });
+  return page.evaluate(async (data) => {
+    const bytes = Uint8Array.from(atob(data), (character) => character.charCodeAt(0));
+    const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+    const context = canvas.getContext("2d");
+    context.drawImage(bitmap, 0, 0);
+    const { data: pixels } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    const result = { blue: 0, red: 0, surface: 0, top: 1, bottom: 0, left: 1, right: 0, redY: 0, redX: 0 };
+    for (let y = 0; y < bitmap.height; y++) {
+      for (let x = 0; x < bitmap.width; x++) {
+        const at = 4 * (y * bitmap.width + x);
+        const [r, g, b] = [pixels[at], pixels[at + 1], pixels[at + 2]];
+        const blue = b > 70 && b > 1.6 * r && b > 1.2 * g;
+        const red = r > 70 && r > 1.7 * g && r > 1.7 * b;
+        const clay = r > 75 && Math.abs(r - b) < 60 && r >= b - 8;
+        if (blue) result.blue++;
+        if (red) {
+          result.red++;
+          result.redX += x / bitmap.width;
+          result.redY += y / bitmap.height;
+        }
+        if (!(blue || red || clay)) continue;
+        result.surface++;
+        result.top = Math.min(result.top, y / bitmap.height);
+        result.bottom = Math.max(result.bottom, y / bitmap.height);
+        result.left = Math.min(result.left, x / bitmap.width);
+        result.right = Math.max(result.right, x / bitmap.width);
+      }
+    }
+    if (result.red > 0) {
+      result.redX /= result.red;
+      result.redY /= result.red;
+    }
+    return result;
+  }, shot.toString("base64"));
+}
+
+/** Fails where the page reported an error or broke the content security policy. */
+export async function checkTroubles(page, troubles) {
+  const violations = await page.evaluate(() => globalThis.violations);
+  const all = [...troubles, ...violations];
+  if (all.length > 0) throw new Error(`the page reported: ${all.join("; ")}`);
+}
