@@ -25,7 +25,7 @@ constexpr std::array kTable = {
     LimitInfo{"max_streams", &Limits::max_streams, 1, 10'000, "streams open at once"},
     LimitInfo{"max_decoders", &Limits::max_decoders, 1, 64, "uploads decoded at once"},
     LimitInfo{"max_upload_memory", &Limits::max_upload_memory, 1, kTebi,
-              "bytes of all uploads that are being received or decoded"},
+              "bytes of all bodies that are being received or worked on"},
     LimitInfo{"max_head_bytes", &Limits::max_head_bytes, 1024, 1U << 20U, "bytes of a request's head"},
     LimitInfo{"max_headers", &Limits::max_headers, 8, 1000, "headers of a request"},
     LimitInfo{"max_path_bytes", &Limits::max_path_bytes, 128, 8192, "bytes of a request's path"},

@@ -23,6 +23,7 @@ struct ServiceParts {
   Decoder decode;
   HierarchyBuilder build;
   AssetTable assets;
+  std::function<void(const std::string&)> report_failure = {};  ///< of tasks that nobody waits for
 };
 
 /// Everything that lives as long as the daemon does. Members are thread-safe.
@@ -33,8 +34,9 @@ class Service {
   const Config config;
   const Decoder decode;
   const AssetTable assets;
-  ComputePool background;   ///< what lasts for seconds: building, exporting
+  // Builders post to strands of the interactive pool: it must outlive the background one.
   ComputePool interactive;  ///< what a hand waits for: painting, previews, edits
+  ComputePool background;   ///< what lasts for seconds: building, exporting
   CloudStore clouds;
   SessionStore sessions;
   Budget upload_memory;

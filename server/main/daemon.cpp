@@ -92,7 +92,10 @@ int run_daemon(const Config& config) {
     Service service(config,
                     {.decode = confined_decoder(config.limits),
                      .build = build_hierarchy,
-                     .assets = config.web_root.empty() ? AssetTable() : AssetTable::load(config.web_root)});
+                     .assets = config.web_root.empty() ? AssetTable() : AssetTable::load(config.web_root),
+                     .report_failure = [&log](const std::string& text) {
+                       log.write(LogLevel::kError, "task-failed", {{"failure", text}});
+                     }});
     if (auto problem = load_samples(service, log)) return fail(*problem);
     HttpServer server(
         http_options(config),

@@ -66,15 +66,17 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
   return {};
 }
 
-/// Holds memory for an upload's bytes. A body over its limit is not held for: the fence refuses it.
-Outcome<std::shared_ptr<void>> admit_upload(Service& service, const RequestHead& head) {
+/// Holds memory for a body before it is read. One over its limit is not held for: the fence refuses it.
+Outcome<std::shared_ptr<void>> admit_body(Service& service, const BodyPolicy& policy,
+                                          const RequestHead& head) {
   const std::uint64_t length = head.content_length.value_or(0);
-  if (length > service.config.limits.max_upload_bytes) return std::shared_ptr<void>();
-  if (auto room = service.clouds.check_room(); !room.ok()) return room.problem();
+  if (length > policy.max_bytes) return std::shared_ptr<void>();
+  if (policy.kind == Body::kCloud)
+    if (auto room = service.clouds.check_room(); !room.ok()) return room.problem();
   auto hold = service.upload_memory.hold(length);
   if (hold == nullptr)
     return Problem{.kind = ProblemKind::kOverloaded,
-                   .detail = "other uploads take the memory for uploads",
+                   .detail = "other requests take the memory for bodies",
                    .limit = static_cast<double>(service.upload_memory.total()),
                    .actual = static_cast<double>(service.upload_memory.held() + length)};
   return hold;
@@ -87,8 +89,8 @@ Resolution endpoint_of(Service& service, const Route& route, std::vector<std::st
       .route = std::string(route.pattern),
       .captures = std::move(captures),
       .handle = [&service, handler = route.handler](const Request& r) { return handler(service, r); }};
-  if (route.body == Body::kCloud) {
-    auto admitted = admit_upload(service, head);
+  if (route.body != Body::kNone) {
+    auto admitted = admit_body(service, endpoint.body, head);
     if (!admitted.ok()) return problem_response(admitted.problem(), head.path, request_id);
     endpoint.hold = admitted.value();
   }

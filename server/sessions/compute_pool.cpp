@@ -1,10 +1,14 @@
 #include "server/sessions/compute_pool.h"
 
+#include <exception>
+
 #include "engine/core/parallel.h"
 
 namespace pointwright::server {
 
-ComputePool::ComputePool(std::size_t threads, int task_threads) : task_threads_(task_threads) {
+ComputePool::ComputePool(std::size_t threads, int task_threads,
+                         std::function<void(const std::string&)> report_failure)
+    : task_threads_(task_threads), report_failure_(std::move(report_failure)) {
   for (std::size_t i = 0; i < threads; ++i) threads_.emplace_back([this] { run(); });
 }
 
@@ -38,7 +42,17 @@ void ComputePool::run() {
       task = std::move(tasks_.front());
       tasks_.pop_front();
     }
-    with_threads(task_threads_, task);
+    guarded([&] { with_threads(task_threads_, task); });
+  }
+}
+
+void ComputePool::guarded(const std::function<void()>& task) const {
+  try {
+    task();
+  } catch (const std::exception& error) {
+    if (report_failure_) report_failure_(error.what());
+  } catch (...) {
+    if (report_failure_) report_failure_("an unknown exception");
   }
 }
 
@@ -64,7 +78,7 @@ void Strand::run_one(const std::shared_ptr<State>& state) {
     task = std::move(state->tasks.front());
     state->tasks.pop_front();
   }
-  task();
+  state->pool.guarded(task);
   task = nullptr;  // what it holds is let go before the next one starts
   {
     const std::lock_guard lock(state->mutex);

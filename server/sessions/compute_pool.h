@@ -9,6 +9,7 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <type_traits>
 #include <vector>
@@ -20,13 +21,17 @@ namespace pointwright::server {
 class ComputePool {
  public:
   /// `task_threads`: threads that each task's parallel loops may use; 0: all of the machine's.
-  ComputePool(std::size_t threads, int task_threads);
+  /// `report_failure` gets the text of what a posted task threw.
+  ComputePool(std::size_t threads, int task_threads,
+              std::function<void(const std::string&)> report_failure = {});
   ~ComputePool();
   ComputePool(const ComputePool&) = delete;
   ComputePool& operator=(const ComputePool&) = delete;
 
-  /// Tasks must not throw.
+  /// What the task throws ends the task alone and is reported.
   void post(std::function<void()> task);
+  /// Runs the task here and now, as post() would later.
+  void guarded(const std::function<void()>& task) const;
 
   /// Runs `work` and hands its result, or its exception, to the future.
   template <typename Work>
@@ -41,6 +46,7 @@ class ComputePool {
   void run();
 
   int task_threads_;
+  std::function<void(const std::string&)> report_failure_;
   std::mutex mutex_;  // guards tasks_ and stopping_
   std::condition_variable wake_;
   std::deque<std::function<void()>> tasks_;

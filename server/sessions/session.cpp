@@ -59,29 +59,31 @@ std::shared_ptr<Session> Session::create(SessionParams params, SessionServices s
 
 void Session::build() {
   const auto begin = SteadyClock::now();
-  Result<Hierarchy> built = [&]() -> Result<Hierarchy> {
-    try {
-      return rest_.build(*params_.cloud, params_.hierarchy, context_);
-    } catch (const std::bad_alloc&) {
-      return Error{.code = ErrorCode::kTooLarge,
-                   .message = "the server has no memory for this hierarchy",
-                   .field = {}};
-    }
-  }();
+  std::shared_ptr<Result<Hierarchy>> built;
+  try {
+    built = std::make_shared<Result<Hierarchy>>(rest_.build(*params_.cloud, params_.hierarchy, context_));
+  } catch (const std::bad_alloc&) {
+    fail({.kind = ProblemKind::kOutOfSpace, .detail = "the server has no memory for this hierarchy"});
+    throw;
+  } catch (...) {
+    // Whatever it was, nobody must wait for this session for ever. The pool reports it.
+    fail({.kind = ProblemKind::kInternalError, .detail = "building failed; the log says why"});
+    throw;
+  }
   note_time("build", begin);
-  strand_.post([self = shared_from_this(), built = std::make_shared<Result<Hierarchy>>(std::move(built))] {
-    self->finish_building(std::move(*built));
-  });
+  strand_.post([self = shared_from_this(), built] { self->finish_building(std::move(*built)); });
+}
+
+void Session::fail(Problem problem) {
+  Document failed = *document();
+  failed.state = protocol::SessionState::kFailed;
+  failed.error = std::move(problem);
+  publish(std::move(failed));
 }
 
 void Session::finish_building(Result<Hierarchy> built) {
+  if (!built) return fail(protocol::to_problem(built.error()));
   Document document = *this->document();
-  if (!built) {
-    document.state = protocol::SessionState::kFailed;
-    document.error = protocol::to_problem(built.error());
-    publish(std::move(document));
-    return;
-  }
   Hierarchy hierarchy = std::move(built).value();
   rest_.spacing = std::move(hierarchy.spacing);
   median_spacing_ = median_of(rest_.spacing);
@@ -290,7 +292,7 @@ Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request) {
   if (!verdict->ok()) return *verdict;
   const std::lock_guard lock(preview_mutex_);
   const auto now = SteadyClock::now();
-  if (request.sequence <= newest_sequence_ && now - newest_sequence_time_ < kReorderWindow) return Done{};
+  if (request.sequence < newest_sequence_ && now - newest_sequence_time_ < kReorderWindow) return Done{};
   newest_sequence_ = request.sequence;
   newest_sequence_time_ = now;
   pending_preview_ = std::make_shared<const protocol::PreviewRequest>(request);
@@ -352,7 +354,7 @@ Outcome<Done> Session::end_preview() {
   {
     const std::lock_guard lock(preview_mutex_);
     pending_preview_.reset();
-    newest_sequence_time_ = SteadyClock::now();
+    newest_sequence_ = 0;  // another drag may count anew
   }
   return on_strand([this]() -> Outcome<Done> {
     if (shows_preview_) show_committed();

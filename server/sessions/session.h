@@ -114,6 +114,7 @@ class Session : public std::enable_shared_from_this<Session> {
   // Everything below runs on the strand, except where it says otherwise.
   void build();  // on the background pool
   void finish_building(Result<Hierarchy> built);
+  void fail(protocol::Problem problem);  // while building
   void publish(Document document);
   void show_committed();
   void run_preview();

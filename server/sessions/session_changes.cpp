@@ -114,7 +114,7 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, std::uint6
     {
       const std::lock_guard lock(preview_mutex_);
       pending_preview_.reset();
-      newest_sequence_time_ = SteadyClock::now();
+      newest_sequence_ = 0;  // another drag may count anew
     }
     show_committed();
     schedule_field();

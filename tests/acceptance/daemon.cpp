@@ -1,4 +1,4 @@
-#include "daemon.h"
+#include "tests/acceptance/daemon.h"
 
 #include <fcntl.h>
 #include <signal.h>

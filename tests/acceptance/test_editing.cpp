@@ -6,10 +6,10 @@
 #include <set>
 #include <thread>
 
-#include "daemon.h"
 #include "engine/io/cloud_io.h"
 #include "protocol/frames/frame.h"
 #include "protocol/frames/stream_record.h"
+#include "tests/acceptance/daemon.h"
 #include "tests/server/raw_client.h"
 #include "tests/server/synthetic.h"
 

@@ -5,8 +5,8 @@
 #include <random>
 #include <thread>
 
-#include "daemon.h"
 #include "engine/io/cloud_io.h"
+#include "tests/acceptance/daemon.h"
 #include "tests/server/raw_client.h"
 #include "tests/server/synthetic.h"
 
@@ -28,7 +28,7 @@ std::string ply_header(const std::string& count) {
 
 void check_refused(Daemon& daemon, const std::string& bytes, const std::string& type, const char* what) {
   const auto begin = std::chrono::steady_clock::now();
-  const Reply reply = daemon.upload(bytes, type);
+  Reply reply = daemon.upload(bytes, type);
   CHECK_MESSAGE(reply.status >= 400, what);
   CHECK_MESSAGE(reply.status < 500, what);
   CHECK_MESSAGE(reply.headers["content-type"] == "application/problem+json", what);

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "daemon.h"
 #include "engine/io/cloud_io.h"
+#include "tests/acceptance/daemon.h"
 #include "tests/server/synthetic.h"
 
 using namespace pointwright;
@@ -53,12 +53,12 @@ TEST_CASE("the viewer's files are served from an exact table and nothing else of
   write_file(folder / "outside.txt", "no");
   std::filesystem::create_symlink(folder / "outside.txt", folder / "web/link.txt");
   Daemon daemon({"--web", folder / "web"});
-  const Reply page = daemon.get("/", "Accept: text/html,*/*;q=0.8\r\n");
+  Reply page = daemon.get("/", "Accept: text/html,*/*;q=0.8\r\n");
   CHECK(page.status == 200);
   CHECK(page.headers["content-type"] == "text/html; charset=utf-8");
   CHECK(page.headers["content-security-policy"].find("default-src 'none'") == 0);
   CHECK(daemon.get("/", "Accept: application/json\r\n").json()["service"] == "pointwright");
-  const Reply script = daemon.get("/assets/app-1234.js", "Accept-Encoding: gzip\r\n");
+  Reply script = daemon.get("/assets/app-1234.js", "Accept-Encoding: gzip\r\n");
   CHECK(script.body == "export {};");
   CHECK(script.headers["cache-control"].find("immutable") != std::string::npos);
   CHECK(daemon.get("/assets/app-1234.js", "If-None-Match: " + script.headers["etag"] + "\r\n").status == 304);
@@ -71,10 +71,10 @@ TEST_CASE("the viewer's files are served from an exact table and nothing else of
 
 TEST_CASE("every answer carries a request id that the log knows") {
   Daemon daemon;
-  const Reply reply = daemon.get("/v1/info", "X-Request-Id: find-me-42\r\n");
+  Reply reply = daemon.get("/v1/info", "X-Request-Id: find-me-42\r\n");
   CHECK(reply.headers["x-request-id"] == "find-me-42");
   CHECK(daemon.get("/nowhere%0a").status == 400);
-  const Reply missing = daemon.get("/nowhere");
+  Reply missing = daemon.get("/nowhere");
   CHECK(missing.json()["request_id"] == missing.headers["x-request-id"]);
   CHECK(daemon.stop(SIGTERM) == 0);
   std::istringstream log(daemon.log());

@@ -13,7 +13,7 @@
 #include "server/handlers/openapi.h"
 #include "server/handlers/service.h"
 #include "server/routes/routes.h"
-#include "synthetic.h"
+#include "tests/server/synthetic.h"
 
 using namespace pointwright;
 using namespace pointwright::server;

@@ -7,8 +7,8 @@
 #include <memory>
 #include <thread>
 
-#include "raw_client.h"
 #include "server/http/http_server.h"
+#include "tests/server/raw_client.h"
 
 using namespace pointwright::server;
 using pointwright::test::body_of;

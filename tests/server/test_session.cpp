@@ -2,11 +2,11 @@
 
 #include <doctest/doctest.h>
 
+#include <stdexcept>
 #include <thread>
 
-#include "engine/core/parallel.h"
 #include "protocol/frames/frame.h"
-#include "synthetic.h"
+#include "tests/server/synthetic.h"
 
 using namespace pointwright;
 using namespace pointwright::server;
@@ -27,8 +27,9 @@ bool comes_true(Condition condition) {
 
 /// Pools, and sessions on a small sheet.
 struct Workshop {
-  ComputePool background{1, 0};
-  ComputePool interactive{2, 0};
+  explicit Workshop(int threads = 0) : interactive(2, threads), background(1, threads) {}
+  ComputePool interactive;
+  ComputePool background;
   std::shared_ptr<const Cloud> cloud = std::make_shared<const Cloud>(wavy_sheet(40));
 
   std::shared_ptr<Session> open(std::uint64_t history_bytes = 1ULL << 30U,
@@ -103,6 +104,18 @@ TEST_CASE("while it builds, and after it failed, a session refuses changes with 
   REQUIRE(comes_true([&] { return failing->document()->state == protocol::SessionState::kFailed; }));
   CHECK(failing->document()->error->detail == "no such scale");
   CHECK(kind_of(failing->commit(lift(1), 0)) == ProblemKind::kWrongState);
+}
+
+TEST_CASE("a session whose building throws has failed, and the next one builds") {
+  Workshop workshop;
+  const auto session = workshop.open(
+      1, [](const Cloud&, const HierarchyParams&, const ExecutionContext&) -> Result<Hierarchy> {
+        throw std::runtime_error("secret");
+      });
+  REQUIRE(comes_true([&] { return session->document()->state == protocol::SessionState::kFailed; }));
+  CHECK(session->document()->error->kind == ProblemKind::kInternalError);
+  CHECK(session->document()->error->detail.find("secret") == std::string::npos);
+  workshop.ready();
 }
 
 TEST_CASE("closing a session cancels its building") {
@@ -256,14 +269,12 @@ TEST_CASE("undo of an edit leaves the painting alone, and painting leaves the ed
 TEST_CASE("the same edits give the same bits with one thread and with many") {
   std::vector<Level> results;
   for (const int threads : {1, 4}) {
-    Workshop workshop;
-    with_threads(threads, [&] {
-      const auto session = workshop.painted();
-      commit(*session, turn(0.7));
-      commit(*session, lift(0.2, 1));
-      commit(*session, lift(0.1));
-      results.push_back(finest(*session));
-    });
+    Workshop workshop(threads);
+    const auto session = workshop.painted();
+    commit(*session, turn(0.7));
+    commit(*session, lift(0.2, 1));
+    commit(*session, lift(0.1));
+    results.push_back(finest(*session));
   }
   CHECK(results[0] == results[1]);
 }
@@ -381,13 +392,18 @@ TEST_CASE("frames bring a viewer from any picture to the newest one") {
   commit(*session, turn(0.3));
   CHECK(update().revision == session->document()->revision);
 
-  // Deltas on top of deltas hold what a key frame holds.
-  seen = 0;
-  const auto by_deltas = blocks;
-  blocks.clear();
-  update();
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  CHECK(blocks.size() == by_deltas.size());
+  // Deltas on top of deltas hold what a key frame holds. (t may still arrive: then both are taken again.)
+  for (int attempt = 0;; ++attempt) {
+    REQUIRE(attempt < 100);
+    update();
+    const auto whole = session->display().frame_since(0, attributes);
+    if (whole.version != seen) continue;
+    const auto key = protocol::decode_frame(*whole.bytes);
+    REQUIRE(key.ok());
+    REQUIRE(key.value().blocks.size() == blocks.size());
+    for (const auto& block : key.value().blocks) CHECK(blocks.at(block.number) == block.position_t);
+    return;
+  }
 }
 
 TEST_CASE("viewers that want the same frame share its bytes") {
