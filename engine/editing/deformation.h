@@ -29,9 +29,8 @@ struct Rotation {
 };
 using Deformation = std::variant<Translation, Rotation>;
 
-/// Errors: kNonFinite; kInvalidArgument (zero axis, length or angle beyond its limit). Fields:
-/// "deformation.vector",
-///         "deformation.point", "deformation.axis", "deformation.angle_rad".
+/// Errors: kNonFinite; kInvalidArgument (zero axis, length or angle beyond its limit).
+/// Fields: "deformation.vector", "deformation.point", "deformation.axis", "deformation.angle_rad".
 Result<void> validate(const Deformation& deformation);
 
 /// F(p, t) of one point in model space, in double precision: the reference that tests compare against.
@@ -40,14 +39,16 @@ Vec3d deform_point(const Deformation& deformation, const Vec3d& p, double t);
 /// The Jacobian dF/dp + dF/dt grad(t)^T of p -> F(p, t(p)) at one point, in double precision (reference).
 Mat3d deformation_jacobian(const Deformation& deformation, const Vec3d& p, double t, const Vec3d& t_gradient);
 
-/// Deforms all samples and their normals: position' = F(position, t), normal' = cofactor(J) normal,
-/// normalised. Samples with t = 0 keep their bits, and so do samples that F leaves in place (a zero vector,
-/// whole turns) with a gradient that does not bend them. Where J folds the surface (the normal vanishes) the
-/// normal turns with dF/dp. Positions are within 5e-7 of their distance to the axis (and of their
-/// coordinates) of deform_point. Shapes:      positions relative to `origin`; outputs are resized to N;
-/// outputs may not alias inputs Pre:         a valid deformation, a field of N samples, finite input. Never
-/// gives NaN Cost:        O(N), vectorised, parallel Determinism: bitwise equal for any thread count and
-/// instruction set
+/// Deforms all samples and their normals: position' = F(position, t), normal' = cofactor(J)
+/// normal, normalised.
+/// Samples with t = 0 keep their bits, and so do samples that F leaves in place (a zero vector, whole turns)
+/// with a gradient that does not bend them. Where J folds the surface (the normal vanishes) the normal turns
+/// with dF/dp. A position is within 5e-7 of deform_point, relative to its distance from the axis and to its
+/// coordinates.
+/// Shapes:      positions relative to `origin`; outputs are resized to N; outputs may not alias inputs
+/// Pre:         a valid deformation, a field of N samples, finite input. Never gives NaN
+/// Cost:        O(N), vectorised, parallel
+/// Determinism: bitwise equal for any thread count and instruction set
 void deform(const Deformation& deformation, const Vec3d& origin, const ScaleField& field,
             const Points& position, const Points& normal, Points& deformed_position, Points& deformed_normal);
 

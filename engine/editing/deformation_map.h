@@ -6,8 +6,9 @@
 
 namespace pointwright {
 
-/// Rotations are taken about the point of their axis that lies nearest to `origin`, and whole quarter turns
-/// are split off in double precision. Pre: a valid deformation.
+/// Rotations are taken about the point of their axis that lies nearest to `origin`, and the angle is split
+/// into parts whose products with t are exact.
+/// Pre: a valid deformation.
 DeformMap to_deform_map(const Deformation& deformation, const Vec3d& origin);
 
 }  // namespace pointwright

@@ -24,12 +24,11 @@ Result<void> validate(const EditParams& params, const MultiresSurface& surface);
 
 /// Deforms level k with the field (computed on that level) and rebuilds the finer ones from their detail
 /// coefficients: p' = p + (r' - r) + d (n' - n), which is Eq. (5) written so that an unmoved sample keeps its
-/// bits. Levels coarser than k are returned as they were; the session re-derives them when they are next
-/// needed. Normals:     on level k those of the deformed surface, cofactor(J) n, exactly. On finer levels the
-/// one-band rule:
-///              the sample's own normal is carried by the same Jacobian, the one of level k's map at that
-///              sample. It is exact for the identity and for rigid motions, and neglects how the bend varies
-///              along the detail.
+/// bits. Levels coarser than k are returned as they were; the session re-derives them when next needed.
+/// Normals:     on level k those of the deformed surface, cofactor(J) n, exactly. On finer levels, by the
+///              one-band rule, the sample's own normal is carried by the same Jacobian, that of level k's map
+///              at the sample. It is exact for the identity and for rigid motions, and neglects how the bend
+///              varies along the detail.
 /// Promises:    t = 0 samples bit-identical on every level; a zero deformation is the identity, to the bit;
 ///              a rigid motion of everything is reproduced to 1e-6 of the diagonal
 /// Pre:         valid parameters, finite input. Never gives NaN

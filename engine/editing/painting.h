@@ -39,9 +39,9 @@ struct PaintOperation {
 Result<void> validate(const PaintOperation& operation);
 
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
-/// Shapes:      positions relative to `origin`; normals of the same surface (read only where `facing` is
-/// given) Cost:        O(N) with an early bounding-box test per block; parallel Determinism: bitwise equal
-/// for any thread count
+/// Shapes:      positions relative to `origin`; normals of the same surface (read only for `facing`)
+/// Cost:        O(N) with an early bounding-box test per block; parallel
+/// Determinism: bitwise equal for any thread count
 std::size_t paint(const PaintOperation& operation, RegionKind kind, const Points& position,
                   const Points& normal, const Vec3d& origin, Marks& marks);
 

@@ -146,9 +146,11 @@ Region Region::with_radii(const std::vector<float>& radii) const {
   Region result;
   if (empty()) return result;
   const auto tree = std::make_shared<Tree>(*tree_);
-  for (std::size_t i = 0; i < tree->count; ++i) {
-    tree->leaf[tree->slot[i] / kBallFanout].radius[tree->slot[i] % kBallFanout] = radii[i];
-  }
+  parallel_for(tree->count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      tree->leaf[tree->slot[i] / kBallFanout].radius[tree->slot[i] % kBallFanout] = radii[i];
+    }
+  });
   tree->build_nodes();
   result.tree_ = tree;
   return result;
@@ -175,16 +177,18 @@ RegionDistance Region::distance(const Vec3f& p, std::uint32_t& hint) const {
   return {result[0], Vec3f(result[1], result[2], result[3])};
 }
 
-void Region::distances(const Points& points, std::size_t begin, std::size_t end,
-                       RegionDistances& result) const {
+void Region::distances(const Points& points, std::size_t begin, std::size_t end, RegionDistances& result,
+                       const std::vector<float>* limits) const {
   POINTWRIGHT_CHECK(!empty(), "a region without balls has no distance");
   POINTWRIGHT_CHECK(begin % kSimdBlock == 0 && end <= points.size(), "a range that starts with a SIMD block");
   const std::size_t count = end - begin;
+  POINTWRIGHT_CHECK(limits == nullptr || limits->size() >= padded_to_block(count), "one limit per point");
   result.distance.resize(padded_to_block(count));
   result.gradient.resize(count);
   const BallQueries queries{.x = points.x() + begin,
                             .y = points.y() + begin,
                             .z = points.z() + begin,
+                            .limit = limits == nullptr ? nullptr : limits->data(),
                             .distance = result.distance.data(),
                             .gradient_x = result.gradient.x(),
                             .gradient_y = result.gradient.y(),
@@ -218,12 +222,22 @@ Error intersection_error(const Vec3d& place, const char* how) {
   return Error{.code = ErrorCode::kRegionsIntersect, .message = text.data(), .field = "regions"};
 }
 
-// Of every painted sample, the distance to the nearest sample of the other region.
-std::vector<float> distances_to_other(const Points& position, const Region& other) {
-  std::vector<float> result(position.size());
-  parallel_for(position.size(), [&](std::size_t begin, std::size_t end) {
+// A ball's radius is at most this part of the distance to the nearest sample of the other region.
+constexpr float kGapParts = 3.0F;
+
+// Of every painted sample, the distance to the nearest sample of the other region, or the first distance that
+// no longer bounds its radius.
+std::vector<float> distances_to_other(const Painted& painted, const std::vector<float>& spacing,
+                                      const Region& other) {
+  std::vector<float> result(painted.sample.size());
+  parallel_for(result.size(), [&](std::size_t begin, std::size_t end) {
     RegionDistances block;
-    other.distances(position, begin, end, block);
+    std::vector<float> limits(padded_to_block(end - begin), 0.0F);
+    for (std::size_t m = begin; m < end; ++m)
+      limits[m - begin] = kGapParts * spacing[painted.sample[m]] * 1.0001F;
+    // Two samples at one place are found at any limit above 0.
+    for (float& limit : limits) limit = std::max(limit, std::numeric_limits<float>::min());
+    other.distances(painted.position, begin, end, block, &limits);
     std::copy_n(block.distance.begin(), end - begin, result.begin() + static_cast<std::ptrdiff_t>(begin));
   });
   return result;
@@ -237,7 +251,7 @@ std::vector<float> ball_radii(const Painted& painted, const std::vector<float>& 
                               const std::vector<float>& distance_to_other) {
   std::vector<float> radii(painted.sample.size());
   for (std::size_t m = 0; m < radii.size(); ++m) {
-    radii[m] = std::min(spacing[painted.sample[m]], distance_to_other[m] / 3.0F);
+    radii[m] = std::min(spacing[painted.sample[m]], distance_to_other[m] / kGapParts);
   }
   return radii;
 }
@@ -266,14 +280,14 @@ Result<RegionPair> regions_from_marks(const Points& level_position, const std::v
 
   const Region zero_points = point_set(zero);
   const Region one_points = point_set(one);
-  const std::vector<float> zero_to_one = distances_to_other(zero.position, one_points);
+  const std::vector<float> zero_to_one = distances_to_other(zero, spacing, one_points);
   const auto meeting = std::find(zero_to_one.begin(), zero_to_one.end(), 0.0F);
   if (meeting != zero_to_one.end()) {
     const auto m = static_cast<std::size_t>(meeting - zero_to_one.begin());
     return intersection_error(model_place(zero.sample[m]),
                               "samples of the zero- and the one-region coincide");
   }
-  const std::vector<float> one_to_zero = distances_to_other(one.position, zero_points);
+  const std::vector<float> one_to_zero = distances_to_other(one, spacing, zero_points);
   return RegionPair{.zero = zero_points.with_radii(ball_radii(zero, spacing, zero_to_one)),
                     .one = one_points.with_radii(ball_radii(one, spacing, one_to_zero))};
 }

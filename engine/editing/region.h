@@ -51,10 +51,13 @@ class Region {
   /// it never changes the result. Pre: not empty, p finite. Cost: O(log M) typical.
   [[nodiscard]] RegionDistance distance(const Vec3f& p, std::uint32_t& hint) const;
 
-  /// The same for points[begin, end), several times faster: result i - begin is that of point i.
+  /// The same for points[begin, end), several times faster: result i - begin is that of point i, bitwise that
+  /// of distance(). `limits`, where given, holds a limit >= 0 for each (padded to whole SIMD blocks): a point
+  /// at least that far gets the limit as its distance and, where farther, no gradient. Low limits are cheap.
   /// Pre: not empty, finite points (padding included), begin a multiple of kSimdBlock. Sequential: callers
-  /// cut coherent points into blocks. Results are bitwise those of distance().
-  void distances(const Points& points, std::size_t begin, std::size_t end, RegionDistances& result) const;
+  ///      cut coherent points into blocks.
+  void distances(const Points& points, std::size_t begin, std::size_t end, RegionDistances& result,
+                 const std::vector<float>* limits = nullptr) const;
 
  private:
   struct Tree;
@@ -69,10 +72,10 @@ struct RegionPair {
 
 /// Balls around the painted samples, standing where the samples stand on the edited level. A ball's radius is
 /// the sample's local spacing, but at most a third of the distance to the nearest sample of the other region:
-/// neighbouring balls of the two regions never touch, and a third is left for t to pass from 0 to 1. Shapes:
-/// N positions (coherent order is fast, any order is right), N spacings >= 0, N marks Errors: kEmptyRegion
-/// (field "zero" or "one"); kRegionsIntersect with the place, where a sample is in both or two
-///         samples of different regions coincide
+/// neighbouring balls of the two regions never touch, and a third is left for t to pass from 0 to 1.
+/// Shapes: N positions (coherent order is fast, any order is right), N spacings >= 0, N marks
+/// Errors: kEmptyRegion (field "zero" or "one"); kRegionsIntersect with the place, where a sample is in both
+///         or two samples of different regions coincide
 /// Cost:   O(N + M log M), parallel
 /// Determinism: bitwise equal for any thread count
 Result<RegionPair> regions_from_marks(const Points& level_position, const std::vector<float>& spacing,

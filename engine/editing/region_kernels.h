@@ -43,6 +43,7 @@ struct BallQueries {
   const float* x;
   const float* y;
   const float* z;
+  const float* limit;  ///< per point: farther is as good as this; null for no limits
   float* distance;
   float* gradient_x;
   float* gradient_y;

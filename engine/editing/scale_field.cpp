@@ -1,6 +1,6 @@
 #include "engine/editing/scale_field.h"
 
-#include <algorithm>
+#include <limits>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
@@ -35,6 +35,26 @@ DistanceColumns columns_of(const RegionDistances& distances) {
           .gradient_z = distances.gradient.z()};
 }
 
+// Below this a limited query only finds out whether a point is inside a region.
+constexpr float kInsideOnly = std::numeric_limits<float>::min();
+constexpr float kNoLimit = std::numeric_limits<float>::infinity();
+
+// d_0 and d_1 of a block. Inside a region t does not depend on the distance to the other one, which is
+// usually the costly one to find: it is limited there.
+void region_distances(const RegionPair& regions, const Points& position, std::size_t begin, std::size_t end,
+                      RegionDistances& zero, RegionDistances& one) {
+  const std::size_t count = padded_to_block(end - begin);
+  std::vector<float> limits(count, kInsideOnly);
+  regions.one.distances(position, begin, end, one, &limits);
+  for (std::size_t i = 0; i < count; ++i) limits[i] = one.distance[i] <= 0.0F ? kInsideOnly : kNoLimit;
+  regions.zero.distances(position, begin, end, zero, &limits);
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool inside = one.distance[i] <= 0.0F || zero.distance[i] <= 0.0F;
+    limits[i] = inside ? one.distance[i] : kNoLimit;
+  }
+  regions.one.distances(position, begin, end, one, &limits);
+}
+
 }  // namespace
 
 ScaleField compute_scale_field(const Points& position, const RegionPair& regions, Blend blend,
@@ -49,8 +69,7 @@ ScaleField compute_scale_field(const Points& position, const RegionPair& regions
       [&](std::size_t begin, std::size_t end) {
         RegionDistances zero;
         RegionDistances one;
-        regions.zero.distances(position, begin, end, zero);
-        regions.one.distances(position, begin, end, one);
+        region_distances(regions, position, begin, end, zero, one);
         blend_block(ScaleBlend{.zero = columns_of(zero),
                                .one = columns_of(one),
                                .t = field.t.data() + begin,

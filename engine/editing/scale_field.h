@@ -21,16 +21,14 @@ float blend_slope(Blend blend, float x);
 /// t and its gradient per sample. Both depend on the regions and the surface at rest only: computed once a
 /// painting changes, never per frame.
 struct ScaleField {
-  std::vector<float>
-      t;  ///< N (padded to whole SIMD blocks with 0), in [0, 1]: 0 in the zero-region, 1 in the one-region
-  Points gradient;  ///< N, in 1 / model unit; 0 inside the regions
+  std::vector<float> t;  ///< N (padded to SIMD blocks with 0), in [0, 1]: 0 in the zero-region, 1 in the one
+  Points gradient;       ///< N, in 1 / model unit; 0 inside the regions
 
   [[nodiscard]] std::size_t size() const { return gradient.size(); }
   friend bool operator==(const ScaleField&, const ScaleField&) = default;
 };
 
-/// Paper:       Eq. (11), (12). As printed, Eq. (12) contradicts the text (it gives t = 1 in the
-/// zero-region):
+/// Paper:       Eq. (11), (12). As printed, Eq. (12) contradicts the text (t would be 1 in the zero-region):
 ///              t = beta(d_1 / (d_0 + d_1)). See engine/README.md. A point in both regions, which the paper
 ///              excludes, stays where it is: t = 0.
 /// Pre:         both regions non-empty, finite positions

@@ -43,8 +43,8 @@ struct Everything {};
 using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything>;
 
 /// Finite members within kMaxShapeCoordinate, radii > 0, min <= max, a normal that is not zero, at least one
-/// and at most kMaxStrokeVertices vertices. Errors: kInvalidArgument (field "shape.radius" and the like),
-/// kNonFinite, kOutOfRange, kTooLarge (vertices).
+/// and at most kMaxStrokeVertices vertices.
+/// Errors: kInvalidArgument (field "shape.radius" and the like), kNonFinite, kOutOfRange, kTooLarge.
 Result<void> validate(const Shape& shape);
 
 /// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for a stroke.

@@ -34,7 +34,11 @@ export function compileFlags() {
   for (const { file, command } of JSON.parse(
     readFileSync(resolve(root, "build/release/compile_commands.json"), "utf8"),
   )) {
-    const words = command.split(" ").slice(1);
+    // The commands are written for a shell: a definition's quotes come with backslashes.
+    const words = command
+      .split(" ")
+      .slice(1)
+      .map((word) => word.replace(/\\(.)/g, "$1"));
     const kept = words.filter(
       (word, i) => word !== "-c" && word !== "-o" && words[i - 1] !== "-o" && words[i - 1] !== "-c",
     );

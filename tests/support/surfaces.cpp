@@ -185,36 +185,30 @@ Surface cube(std::size_t side, double half, std::uint64_t seed) {
   return coherent(result);
 }
 
-double Bumps::at(const Vec3d& direction) const {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double q = (direction - fibonacci_direction(i, count)).squaredNorm() / (width * width);
-    if (q < 60.0) sum += std::exp(-0.5 * q);
-  }
-  return height * sum;
-}
-
-Vec3d Bumps::gradient(const Vec3d& direction) const {
-  Vec3d sum = Vec3d::Zero();
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3d e = direction - fibonacci_direction(i, count);
-    const double q = e.squaredNorm() / (width * width);
-    if (q < 60.0) sum -= std::exp(-0.5 * q) / (width * width) * e;
-  }
-  sum *= height;
-  return sum - sum.dot(direction) * direction;
-}
-
 double Bumps::spacing() const {
   return std::sqrt(4.0 * kPi / static_cast<double>(count));
 }
 
 Surface bumpy_sphere(std::size_t count, const Bumps& bumps) {
+  std::vector<Vec3d> centers(bumps.count);
+  for (std::size_t c = 0; c < bumps.count; ++c) centers[c] = fibonacci_direction(c, bumps.count);
+  const double reach = 7.0 * bumps.width;  // the rest of a bump is below 1e-10 of its height
   Surface result = empty_surface(count);
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3d direction = fibonacci_direction(i, count);
-    const double radius = 1.0 + bumps.at(direction);
-    add(result, i, radius * direction, radius * direction - bumps.gradient(direction));
+    double height = 0.0;
+    Vec3d gradient = Vec3d::Zero();
+    for (const Vec3d& center : centers) {  // ordered by descending z
+      if (center.z() > direction.z() + reach) continue;
+      if (center.z() < direction.z() - reach) break;
+      const Vec3d e = direction - center;
+      const double bump = bumps.height * std::exp(-0.5 * e.squaredNorm() / (bumps.width * bumps.width));
+      height += bump;
+      gradient -= bump / (bumps.width * bumps.width) * e;
+    }
+    gradient -= gradient.dot(direction) * direction;
+    const double radius = 1.0 + height;
+    add(result, i, radius * direction, radius * direction - gradient);
   }
   return coherent(result);
 }
@@ -335,6 +329,10 @@ std::size_t count_opposed(const Points& normal, const Points& reference) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < normal.size(); ++i) count += normal[i].dot(reference[i]) < 0.0F ? 1U : 0U;
   return count;
+}
+
+double relative_error(double value, double expected) {
+  return std::abs(value - expected) / std::abs(expected);
 }
 
 bool all_finite(const Points& points) {

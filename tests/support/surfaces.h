@@ -67,9 +67,7 @@ struct Bumps {
   double height = 0.01;  ///< of a single bump
   double width = 0.03;   ///< standard deviation, on the unit sphere
 
-  [[nodiscard]] double at(const Vec3d& direction) const;  ///< height of the pattern over a unit direction
-  [[nodiscard]] Vec3d gradient(const Vec3d& direction) const;  ///< its gradient, along the unit sphere
-  [[nodiscard]] double spacing() const;                        ///< between neighbouring bumps: the wavelength
+  [[nodiscard]] double spacing() const;  ///< between neighbouring bumps: the wavelength
 };
 /// The unit sphere with a bump pattern, normals exact. Samples stand over the Fibonacci lattice.
 Surface bumpy_sphere(std::size_t count, const Bumps& bumps);
@@ -106,5 +104,7 @@ double mean_line_angle(const Points& a, const Points& b);
 /// Samples whose normal lies on the other side of the reference's.
 std::size_t count_opposed(const Points& normal, const Points& reference);
 bool all_finite(const Points& points);
+/// |value - expected| / |expected|.
+double relative_error(double value, double expected);
 
 }  // namespace pointwright::test

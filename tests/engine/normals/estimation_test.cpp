@@ -1,0 +1,243 @@
+#include "engine/normals/estimation.h"
+
+#include <doctest/doctest.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "engine/core/parallel.h"
+#include "engine/core/simd_dispatch.h"
+#include "tests/support/surfaces.h"
+
+namespace pointwright {
+namespace {
+
+using namespace test;
+
+constexpr double kDegree = 3.14159265358979 / 180.0;
+
+Points estimated(const Points& points, std::uint32_t k = 10, NormalParams params = {},
+                 std::size_t* degenerate = nullptr) {
+  Points normal;
+  const std::size_t count = estimate_normals(points, build_neighbor_graph(points, k), params, normal);
+  if (degenerate != nullptr) *degenerate = count;
+  return normal;
+}
+
+bool all_unit(const Points& normal) {
+  for (std::size_t i = 0; i < normal.size(); ++i) {
+    if (!(std::abs(normal[i].norm() - 1.0F) < 1e-5F)) return false;
+  }
+  return true;
+}
+
+double worst_line_angle(const Points& a, const Points& b) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, line_angle(a[i], b[i]));
+  return worst;
+}
+
+TEST_CASE("the normals of a plane are exact") {
+  // Rounding alone: offsets within a plane through tilted axes carry 1e-7 of the coordinates, here 40
+  // spacings.
+  for (const Sampling sampling : {Sampling::kRegular, Sampling::kJittered, Sampling::kRandom}) {
+    for (const double spacing : {1e-4, 1.0, 1e4}) {
+      const Surface flat = plane(40, spacing, sampling);
+      std::size_t degenerate = 1;
+      CHECK(worst_line_angle(estimated(flat.position, 10, {}, &degenerate), flat.normal) < 1e-6);
+      CHECK(degenerate == 0);
+    }
+  }
+  const Surface flat = plane(40, 1.0, Sampling::kJittered);
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.7, Vec3d(1, 2, 3).normalized()));
+  Surface tilted = flat;
+  for (std::size_t i = 0; i < flat.size(); ++i) {
+    tilted.position.set(i, (turn * flat.position[i].cast<double>()).cast<float>());
+    tilted.normal.set(i, (turn * flat.normal[i].cast<double>()).cast<float>());
+  }
+  tilted = coherent(tilted);
+  CHECK(worst_line_angle(estimated(tilted.position), tilted.normal) < 1e-4);
+}
+
+TEST_CASE("the error on curved surfaces falls with the spacing") {
+  // A one-sided neighbourhood of size h on a surface of curvature c tilts the plane by about c h: halving h
+  // (four times the samples) halves the error. The rate is read over 16 times the samples: 4, or more where
+  // an even sampling cancels the first order.
+  struct Case {
+    std::string name;
+    std::function<Surface(std::size_t)> make;  // of the count
+    double finest;                             // degrees at the finest, about 1.5 times what is measured
+  };
+  const std::array<std::size_t, 3> counts{2'500, 10'000, 40'000};
+  const std::vector<Case> cases{
+      {"even sphere", [](std::size_t n) { return sphere(n, 1.0, Sampling::kRegular); }, 0.15},
+      {"random sphere", [](std::size_t n) { return sphere(n, 1.0, Sampling::kRandom); }, 0.6},
+      {"even torus", [](std::size_t n) { return torus(n, 1.0, 0.4, Sampling::kRegular); }, 1.0},
+      {"random torus", [](std::size_t n) { return torus(n, 1.0, 0.4, Sampling::kRandom); }, 1.5},
+      {"jittered wave",
+       [](std::size_t n) {
+         const auto side = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(n))));
+         return wave(side, 4.0 / static_cast<double>(side), Sampling::kJittered, 0.1, 1.0);
+       },
+       2.0},
+  };
+  for (const Case& c : cases) {
+    CAPTURE(c.name);
+    std::array<double, 3> error{};
+    for (std::size_t level = 0; level < counts.size(); ++level) {
+      const Surface surface = c.make(counts[level]);
+      const Points normal = estimated(surface.position);
+      CHECK(all_unit(normal));
+      error[level] = mean_line_angle(normal, surface.normal);
+    }
+    MESSAGE(c.name << ": mean error in degrees " << error[0] / kDegree << " " << error[1] / kDegree << " "
+                   << error[2] / kDegree);
+    CHECK(error[2] < c.finest * kDegree);
+    CHECK(error[1] < error[0]);
+    CHECK(error[2] < error[1]);
+    CHECK(error[0] / error[2] > 3.4);
+  }
+}
+
+TEST_CASE("noise tilts the normals in proportion, and wider neighbourhoods less") {
+  // Least squares over k + 1 samples whose mean squared extent along an axis is r^2 / 4, r^2 = k h^2 / pi:
+  // the slope's standard deviation is sigma / (0.9 h sqrt 11), a third of sigma / h an axis, 0.42 sigma / h
+  // in angle; the Gaussian weights, which trust the near ones more, cost up to half as much again.
+  const Surface flat = plane(120, 1.0, Sampling::kJittered);
+  for (const double sigma : {0.02, 0.1}) {
+    const Surface noisy = with_noise(flat, sigma, 5);
+    const double ten = mean_line_angle(estimated(noisy.position, 10), noisy.normal);
+    const double twenty = mean_line_angle(estimated(noisy.position, 20), noisy.normal);
+    MESSAGE("angle over sigma / h: " << ten / sigma << " (k = 10) " << twenty / sigma << " (k = 20)");
+    CHECK(ten < 0.65 * sigma);
+    CHECK(ten > 0.25 * sigma);
+    CHECK(twenty < 0.7 * ten);
+  }
+}
+
+TEST_CASE("the normals are those of the weighted covariance of equations 2 to 4") {
+  const Surface surface = with_noise(torus(3000, 1.0, 0.4, Sampling::kRandom), 0.005);
+  const Points& points = surface.position;
+  const NeighborGraph graph = build_neighbor_graph(points, 10);
+  for (const float sigma : {0.3F, 0.7F, 100.0F}) {
+    CAPTURE(sigma);
+    Points normal;
+    estimate_normals(points, graph, NormalParams{.sigma = sigma}, normal);
+    std::size_t compared = 0;
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Vec3d p = points[i].cast<double>();
+      const double r_sq = (points[graph.index(i, 9)].cast<double>() - p).squaredNorm();
+      double total = 1.0;
+      Vec3d first = Vec3d::Zero();
+      Mat3d second = Mat3d::Zero();
+      for (std::uint32_t j = 0; j < 10; ++j) {
+        const Vec3d e = points[graph.index(i, j)].cast<double>() - p;
+        const double w = std::exp(-e.squaredNorm() / (double{sigma} * double{sigma} * r_sq));
+        total += w;
+        first += w * e;
+        second += w * e * e.transpose();
+      }
+      const Eigen::SelfAdjointEigenSolver<Mat3d> solver(second / total -
+                                                        first * first.transpose() / (total * total));
+      // Where the two smallest eigenvalues are close, no direction is the right one.
+      if (solver.eigenvalues()[0] > 0.3 * solver.eigenvalues()[1]) continue;
+      ++compared;
+      if (line_angle(normal[i], solver.eigenvectors().col(0).cast<float>()) > 1e-3) ++wrong;
+    }
+    CHECK(compared > 2000);
+    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("degenerate neighbourhoods are counted and get a unit vector across their direction") {
+  std::size_t degenerate = 0;
+  SUBCASE("collinear samples") {
+    for (const Vec3f& to : {Vec3f(1, 0, 0), Vec3f(0, 0, 1), Vec3f(1, 1, 1), Vec3f(-3, 2, 0.1F)}) {
+      const Points line = collinear(100, {0, 0, 0}, to);
+      const Points normal = estimated(line, 10, {}, &degenerate);
+      CHECK(degenerate == 100);
+      CHECK(all_unit(normal));
+      for (std::size_t i = 0; i < 100; ++i) CHECK(std::abs(normal[i].dot(to.normalized())) < 1e-3F);
+    }
+  }
+  SUBCASE("samples that coincide") {
+    CHECK(all_unit(estimated(identical(40, {5, 5, 5}), 10, {}, &degenerate)));
+    CHECK(degenerate == 40);
+  }
+  SUBCASE("one sample") {
+    CHECK(all_unit(estimated(identical(1, {5, 5, 5}), 10, {}, &degenerate)));
+    CHECK(degenerate == 1);
+  }
+  SUBCASE("two samples") {
+    const Points normal = estimated(from_list({{0, 0, 0}, {1, 2, 0}}), 10, {}, &degenerate);
+    CHECK(degenerate == 2);
+    CHECK(all_unit(normal));
+    CHECK(std::abs(normal[0].dot(Vec3f(1, 2, 0))) < 1e-4F);
+  }
+  SUBCASE("no sample") {
+    CHECK(estimated(Points{}, 10, {}, &degenerate).empty());
+    CHECK(degenerate == 0);
+  }
+}
+
+TEST_CASE("three samples have the normal of their triangle") {
+  std::size_t degenerate = 1;
+  const Points normal = estimated(from_list({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}), 10, {}, &degenerate);
+  CHECK(degenerate == 0);
+  for (std::size_t i = 0; i < 3; ++i) CHECK(std::abs(normal[i].z()) > 1.0F - 1e-6F);
+}
+
+TEST_CASE("duplicates share one normal") {
+  const Surface ball = sphere(2000, 1.0, Sampling::kRandom);
+  const Points points = joined({ball, ball}).position;
+  const Points normal = estimated(points);
+  for (std::size_t i = 0; i < points.size(); i += 2) CHECK(normal[i] == normal[i + 1]);
+}
+
+TEST_CASE("every instruction set and thread count gives the same bytes") {
+  const Points points = with_noise(torus(20'003, 1.0, 0.4, Sampling::kRandom), 0.003).position;
+  const NeighborGraph graph = build_neighbor_graph(points, 10);
+  const SimdLevel before = simd_level();
+  set_simd_level(SimdLevel::kBase);
+  Points reference;
+  const std::size_t degenerate = estimate_normals(points, graph, {}, reference);
+  for (const SimdLevel level : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
+    set_simd_level(level);
+    for (const int threads : {1, 2, 8}) {
+      with_threads(threads, [&] {
+        Points normal;
+        CHECK(estimate_normals(points, graph, {}, normal) == degenerate);
+        CHECK(normal == reference);
+      });
+    }
+  }
+  set_simd_level(before);
+}
+
+TEST_CASE("a sigma out of range or a graph of other points is a logic error") {
+  const Points points = plane(10, 1.0, Sampling::kRegular).position;
+  const NeighborGraph graph = build_neighbor_graph(points, 10);
+  Points normal;
+  for (const float sigma : {0.0F, -1.0F, 101.0F, std::nanf("")}) {
+    CHECK_THROWS_AS(estimate_normals(points, graph, NormalParams{.sigma = sigma}, normal), LogicError);
+  }
+  CHECK_THROWS_AS(estimate_normals(identical(3, {0, 0, 0}), graph, {}, normal), LogicError);
+}
+
+TEST_CASE("the scale of the model does not matter") {
+  // Powers of two change no mantissa: the same bits, from a millionth of a unit to a million units.
+  const Points points = with_noise(sphere(3000, 1.0, Sampling::kRandom), 0.002).position;
+  const Points reference = estimated(points);
+  for (const float factor : {0x1.0p-20F, 0x1.0p20F}) {
+    Points scaled(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) scaled.set(i, factor * points[i]);
+    CHECK(estimated(scaled) == reference);
+  }
+}
+
+}  // namespace
+}  // namespace pointwright

@@ -1,0 +1,182 @@
+#include "engine/normals/orientation.h"
+
+#include <doctest/doctest.h>
+
+#include "engine/core/parallel.h"
+#include "engine/normals/estimation.h"
+#include "tests/support/surfaces.h"
+
+namespace pointwright {
+namespace {
+
+using namespace test;
+
+struct Oriented {
+  Points normal;
+  OrientationReport report;
+};
+
+// Estimated, then oriented: what a cloud without normals gets.
+Oriented estimate_and_orient(const Points& points, std::uint32_t k = 10) {
+  Oriented result;
+  const NeighborGraph graph = build_neighbor_graph(points, k);
+  estimate_normals(points, graph, {}, result.normal);
+  result.report = orient_normals(points, graph, result.normal);
+  return result;
+}
+
+// The true normals with random signs: orientation alone.
+Oriented orient_scrambled(const Surface& surface, std::uint32_t k = 10) {
+  Oriented result{.normal = scrambled_signs(surface.normal, 77), .report = {}};
+  result.report = orient_normals(surface.position, build_neighbor_graph(surface.position, k), result.normal);
+  return result;
+}
+
+TEST_CASE("closed smooth surfaces point outward everywhere") {
+  for (const Surface& surface :
+       {sphere(10'000, 1.0, Sampling::kRegular), sphere(10'000, 1.0, Sampling::kRandom),
+        torus(20'000, 1.0, 0.4, Sampling::kRegular), torus(20'000, 1.0, 0.4, Sampling::kRandom),
+        moved(sphere(5'000, 1.0, Sampling::kRegular), {100.0, -50.0, 20.0})}) {
+    const Oriented found = estimate_and_orient(surface.position);
+    CHECK(found.report.components == 1);
+    CHECK(count_opposed(found.normal, surface.normal) == 0);
+    CHECK(count_opposed(orient_scrambled(surface).normal, surface.normal) == 0);
+  }
+}
+
+TEST_CASE("orientation only flips signs") {
+  const Surface surface = torus(5'000, 1.0, 0.4, Sampling::kRandom);
+  const Points before = scrambled_signs(surface.normal, 3);
+  Points after = before;
+  orient_normals(surface.position, build_neighbor_graph(surface.position, 10), after);
+  for (std::size_t i = 0; i < before.size(); ++i) CHECK((after[i] == before[i] || after[i] == -before[i]));
+}
+
+TEST_CASE("a bumpy sphere points outward in its hollows, too") {
+  const Surface surface = bumpy_sphere(30'000, {.count = 120, .height = 0.05, .width = 0.1});
+  CHECK(count_opposed(estimate_and_orient(surface.position).normal, surface.normal) == 0);
+}
+
+TEST_CASE("two sheets closer than a spacing keep their two sides") {
+  // The nearest neighbours of a sample lie on the other sheet: n_a . n_b would turn one of them over.
+  for (const double gap : {0.5, 0.8, 1.5}) {
+    CAPTURE(gap);
+    const Surface sheets = parallel_sheets(60, 1.0, gap, Sampling::kJittered);
+    const Oriented found = orient_scrambled(sheets);
+    CHECK(found.report.components == 1);
+    CHECK(count_opposed(found.normal, sheets.normal) == 0);
+  }
+}
+
+TEST_CASE("a thin plate is right on both sides and around its rim") {
+  // About four spacings thick in the middle; the rim's radius is a fifteenth of a spacing.
+  const Surface plate = ellipsoid(30'000, {1.0, 1.0, 0.03});
+  CHECK(count_opposed(orient_scrambled(plate).normal, plate.normal) == 0);
+  // Along the rim estimated normals are as good as random.
+  const Oriented found = estimate_and_orient(plate.position);
+  std::size_t opposed = 0;
+  std::size_t judged = 0;
+  for (std::size_t i = 0; i < plate.size(); ++i) {
+    if (std::abs(plate.normal[i].z()) < 0.7F) continue;
+    ++judged;
+    opposed += found.normal[i].dot(plate.normal[i]) < 0.0F ? 1U : 0U;
+  }
+  CHECK(judged > plate.size() * 95 / 100);
+  CHECK(opposed == 0);
+}
+
+TEST_CASE("every component points outward by itself") {
+  const Surface surface = joined({sphere(3'000, 1.0, Sampling::kRegular),
+                                  moved(sphere(2'000, 0.5, Sampling::kRandom), {3.0, 0.0, 0.0}),
+                                  moved(torus(4'000, 1.0, 0.3, Sampling::kRegular), {0.0, 5.0, 1.0})});
+  const Oriented found = estimate_and_orient(surface.position);
+  CHECK(found.report.components == 3);
+  CHECK(found.report.small_components == 0);
+  CHECK(count_opposed(found.normal, surface.normal) == 0);
+}
+
+TEST_CASE("an open hemisphere points away from its centre") {
+  const Surface surface = hemisphere(10'000, 1.0);
+  const Oriented found = estimate_and_orient(surface.position);
+  CHECK(found.report.components == 1);
+  CHECK(count_opposed(found.normal, surface.normal) == 0);
+}
+
+TEST_CASE("a cube with sharp edges points outward on all six faces") {
+  const Surface surface = cube(40, 1.0);
+  CHECK(count_opposed(orient_scrambled(surface).normal, surface.normal) == 0);
+  // Estimated normals lean over at the edges, but never beyond a right angle from both faces' outside.
+  const Oriented found = estimate_and_orient(surface.position);
+  std::size_t inward = 0;
+  for (std::size_t i = 0; i < surface.size(); ++i) {
+    inward += found.normal[i].dot(surface.position[i]) <= 0.0F ? 1U : 0U;
+  }
+  CHECK(inward == 0);
+}
+
+TEST_CASE("small components take the side of the nearest large one") {
+  // Specks of 20 samples just outside and just inside a sphere: flat, so that they cannot tell their own
+  // outside.
+  const Surface ball = sphere(20'000, 1.0, Sampling::kRegular);
+  std::vector<Surface> parts{ball};
+  Random random(8);
+  for (int speck = 0; speck < 12; ++speck) {
+    const Vec3d n = random.direction();
+    const Vec3d u = n.unitOrthogonal();
+    const Vec3d v = n.cross(u);
+    Surface part{Points(20), Points(20)};
+    for (std::size_t i = 0; i < 20; ++i) {
+      const Vec3d at = (speck % 2 == 0 ? 1.1 : 0.9) * n + 0.002 * (random.normal() * u + random.normal() * v);
+      part.position.set(i, at.cast<float>());
+      part.normal.set(i, n.cast<float>());
+    }
+    parts.push_back(part);
+  }
+  const Surface surface = joined(parts);
+  const Oriented found = estimate_and_orient(surface.position);
+  CHECK(found.report.components == 13);
+  CHECK(found.report.small_components == 12);
+  CHECK(count_opposed(found.normal, surface.normal) == 0);
+}
+
+TEST_CASE("degenerate clouds are oriented without harm") {
+  for (const Points& points :
+       {Points{}, identical(1, {1, 1, 1}), identical(100, {1, 1, 1}), collinear(100, {0, 0, 0}, {1, 2, 3}),
+        from_list({{0, 0, 0}, {1, 0, 0}}), from_list({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})}) {
+    const Oriented found = estimate_and_orient(points);
+    CHECK(all_finite(found.normal));
+    CHECK(found.report.components <= std::max<std::size_t>(points.size(), 0));
+  }
+}
+
+TEST_CASE("duplicates end on one side and in one component") {
+  const Surface ball = sphere(3'000, 1.0, Sampling::kRegular);
+  const Surface surface = joined({ball, ball, ball});
+  const Oriented found = estimate_and_orient(surface.position);
+  CHECK(found.report.components == 1);
+  CHECK(count_opposed(found.normal, surface.normal) == 0);
+}
+
+TEST_CASE("the sides do not depend on the threads, nor on the signs that came in") {
+  const Surface surface = with_noise(torus(20'000, 1.0, 0.4, Sampling::kRandom), 0.004);
+  const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
+  Points reference = surface.normal;
+  with_threads(1, [&] { orient_normals(surface.position, graph, reference); });
+  for (const int threads : {2, 8}) {
+    for (const std::uint64_t seed : {1U, 2U}) {
+      Points normal = scrambled_signs(surface.normal, seed);
+      with_threads(threads, [&] { orient_normals(surface.position, graph, normal); });
+      CHECK(count_opposed(normal, reference) == 0);
+    }
+  }
+}
+
+TEST_CASE("orient_like takes the side of a reference and nothing else") {
+  const Surface surface = sphere(1'000, 1.0, Sampling::kRandom);
+  Points normal = scrambled_signs(surface.normal, 4);
+  orient_like(surface.normal, normal);
+  CHECK(normal == surface.normal);
+}
+
+}  // namespace
+}  // namespace pointwright
