@@ -102,17 +102,15 @@ int run_daemon(const Config& config) {
         [&service](const RequestHead& head, const std::string& id) { return resolve(service, head, id); },
         [&log](const RequestLog& request) { log.request(request); });
     if (auto problem = server.start()) return fail(*problem);
+    // The socket listens already: whoever reads the port can connect, and is served once the thread below
+    // runs.
+    if (auto problem = write_port_file(config.port_file, server.port())) return fail(*problem);
     std::atomic<bool> ended_by_itself{false};
     std::thread listener([&] {
       if (server.run()) return;
       ended_by_itself = true;
       ::kill(::getpid(), SIGUSR1);  // wakes the wait below
     });
-    if (auto problem = write_port_file(config.port_file, server.port())) {
-      server.stop(std::chrono::milliseconds(0));
-      listener.join();
-      return fail(*problem);
-    }
     log.write(LogLevel::kInfo, "started",
               {{"version", POINTWRIGHT_VERSION},
                {"host", config.host},

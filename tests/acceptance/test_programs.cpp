@@ -99,8 +99,8 @@ TEST_CASE("a daemon that cannot serve says why and exits with an error") {
   CHECK(run({POINTWRIGHTD_PATH, "--no-such-option"}).status == 2);
   CHECK(run({POINTWRIGHTD_PATH, "--port", "0", "--web", "/nonexistent"}).status == 1);
   CHECK(run({POINTWRIGHTD_PATH, "--port", "0", "--sample", "/nonexistent.ply"}).status == 1);
-  CHECK(run({POINTWRIGHTD_PATH, "--port", "0", "--log-file", "/nonexistent/log"}).status == 1);
-  CHECK(run({POINTWRIGHTD_PATH, "--port", "0", "--port-file", "/nonexistent/port"}).status == 1);
+  CHECK(run({POINTWRIGHTD_PATH, "--port", "0", "--log-file", "/dev/null/log"}).status == 1);
+  CHECK(run({POINTWRIGHTD_PATH, "--port", "0", "--port-file", "/dev/null/port"}).status == 1);
   CHECK(run({POINTWRIGHTD_PATH, "--version"}).out.find("pointwrightd ") == 0);
 }
 
