@@ -14,7 +14,7 @@ const out = resolve(root, "build/demo");
 const dragon = resolve(root, "build/data/dragon.drc");
 const angleDeg = 40;
 const previewCount = 12;
-const camera = { position: [-0.06, 0.185, 0.42], target: [-0.005, 0.122, 0], up: [0, 1, 0] };
+const camera = { position: [-0.045, 0.165, 0.285], target: [-0.006, 0.124, 0], up: [0, 1, 0] };
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 const here = (path) => relative(process.cwd(), path);
