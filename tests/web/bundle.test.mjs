@@ -9,7 +9,8 @@ import { root } from "./support.mjs";
 const dist = resolve(root, "web/dist");
 const scriptBudget = 200_000;
 
-const files = () => readdirSync(dist, { recursive: true, withFileTypes: true }).filter((entry) => entry.isFile());
+const files = () =>
+  readdirSync(dist, { recursive: true, withFileTypes: true }).filter((entry) => entry.isFile());
 const read = (entry) => readFileSync(resolve(entry.parentPath ?? entry.path, entry.name));
 
 test("the scripts stay within 200 kB, compressed", () => {
@@ -32,7 +33,9 @@ test("no script makes code of text, and no file names another host", () => {
     assert.doesNotMatch(text, /\beval\(|new Function\(/, entry.name);
     const hosts = [...text.matchAll(/https?:\/\/([a-z0-9.-]+)/g)].map(([, host]) => host);
     // The SVG name space is a name, and three.js' messages name its own pages; none of them is fetched.
-    const strange = hosts.filter((host) => !["www.w3.org", "threejs.org", "github.com", "jcgt.org"].includes(host));
+    const strange = hosts.filter(
+      (host) => !["www.w3.org", "threejs.org", "github.com", "jcgt.org"].includes(host),
+    );
     assert.deepEqual(strange, [], entry.name);
   }
 });

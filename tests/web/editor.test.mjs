@@ -24,10 +24,13 @@ let service;
 let browser;
 let open;
 
-before(async () => {
-  service = await startService();
-  ({ browser, open } = await openBrowser());
-}, { timeout });
+before(
+  async () => {
+    service = await startService();
+    ({ browser, open } = await openBrowser());
+  },
+  { timeout },
+);
 
 after(async () => {
   await browser?.close();
@@ -63,9 +66,22 @@ async function project(page, x, y) {
 async function paintCaps(session, page) {
   const url = (region) => `${service.url}/v1/sessions/${session.id}/regions/${region}/operations`;
   const paint = (region, sign) => {
-    const [min, max] = sign < 0 ? [[-3, -3, -3], [-0.7, 3, 3]] : [[0.7, -3, -3], [3, 3, 3]];
+    const [min, max] =
+      sign < 0
+        ? [
+            [-3, -3, -3],
+            [-0.7, 3, 3],
+          ]
+        : [
+            [0.7, -3, -3],
+            [3, 3, 3],
+          ];
     const operation = { mode: "add", shape: { type: "box", min, max } };
-    return json(url(region), { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(operation) });
+    return json(url(region), {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify(operation),
+    });
   };
   await paint("zero", -1);
   const { revision } = await paint("one", 1);
@@ -148,7 +164,10 @@ test("the handle moves the one-region: preview, recorded edit, undo, redo", { ti
   const during = await countPixels(page);
   assert.ok(during.redY < before.redY - 0.03, "the red cap has moved up");
   await page.keyboard.press("Enter");
-  await page.waitForFunction((revision) => globalThis.pointwright.status.revision > revision, session.revision + 2);
+  await page.waitForFunction(
+    (revision) => globalThis.pointwright.status.revision > revision,
+    session.revision + 2,
+  );
   await waitForIdle(page, waitMs);
   const history = await edits();
   assert.equal(history.head, 1);
@@ -162,13 +181,20 @@ test("the handle moves the one-region: preview, recorded edit, undo, redo", { ti
 
   await page.locator("canvas.viewport-canvas").focus();
   await page.keyboard.press("Control+z");
-  await page.waitForFunction((revision) => globalThis.pointwright.status.revision > revision, (await state()).revision - 1);
-  await page.waitForFunction(() => document.querySelector('[data-action="undo"]').disabled, null, { timeout: waitMs });
+  await page.waitForFunction(
+    (revision) => globalThis.pointwright.status.revision > revision,
+    (await state()).revision - 1,
+  );
+  await page.waitForFunction(() => document.querySelector('[data-action="undo"]').disabled, null, {
+    timeout: waitMs,
+  });
   await waitForIdle(page, waitMs);
   assert.equal((await edits()).head, 0);
   assert.ok(Math.abs((await countPixels(page)).redY - before.redY) < 0.01, "undo brings the shape back");
   await page.keyboard.press("Control+Shift+Z");
-  await page.waitForFunction(() => document.querySelector('[data-action="redo"]').disabled, null, { timeout: waitMs });
+  await page.waitForFunction(() => document.querySelector('[data-action="redo"]').disabled, null, {
+    timeout: waitMs,
+  });
   await waitForIdle(page, waitMs);
   assert.equal((await edits()).head, 1);
   assert.ok(Math.abs((await countPixels(page)).redY - recorded.redY) < 0.01);
@@ -183,7 +209,9 @@ test("Escape drops a transform and leaves no trace", { timeout }, async () => {
   await page.getByLabel("Move by Y").fill("0.4");
   await page.waitForFunction(() => globalThis.pointwright.status.lastSequence > 0, null, { timeout: waitMs });
   await page.getByLabel("Move by Y").press("Escape");
-  await page.waitForFunction(() => globalThis.pointwright.status.lastSequence === 0, null, { timeout: waitMs });
+  await page.waitForFunction(() => globalThis.pointwright.status.lastSequence === 0, null, {
+    timeout: waitMs,
+  });
   await waitForIdle(page, waitMs);
   assert.equal((await edits()).edits.length, 0);
   assert.equal((await state()).revision, 2);
@@ -233,7 +261,10 @@ test("the whole loop works by the keyboard: shapes and a rotation by numbers", {
 test("the export is the edited cloud", { timeout }, async () => {
   const { page, session, close } = await openEditor();
   await page.getByText("Export", { exact: true }).click();
-  const [download] = await Promise.all([page.waitForEvent("download"), page.locator('[data-format="ply"]').click()]);
+  const [download] = await Promise.all([
+    page.waitForEvent("download"),
+    page.locator('[data-format="ply"]').click(),
+  ]);
   assert.equal(download.suggestedFilename(), "Capsule.ply");
   const bytes = readFileSync(await download.path());
   assert.match(bytes.toString("latin1", 0, 400), new RegExp(`element vertex ${session.sample_count}\\n`));
@@ -244,14 +275,18 @@ test("a link carries the camera and the display", { timeout }, async () => {
   const { page, session, close } = await openEditor();
   await page.getByLabel("Show").selectOption("t");
   await waitForIdle(page, waitMs);
-  await page.waitForFunction(() => /mode=t/.test(location.hash) && /cam=0,0,6;/.test(location.hash), null, { timeout: waitMs });
+  await page.waitForFunction(() => /mode=t/.test(location.hash) && /cam=0,0,6;/.test(location.hash), null, {
+    timeout: waitMs,
+  });
   assert.ok(await page.locator(".colour-bar").isVisible());
   const hash = await page.evaluate(() => location.hash);
   await close();
   const second = await open(sessionUrl(service, session, hash));
   await waitForIdle(second.page, waitMs);
   const camera = await second.page.evaluate(() => globalThis.pointwright.camera);
-  camera.position.forEach((value, axis) => assert.ok(Math.abs(value - frontCamera.position[axis]) < 1e-4));
+  for (const [axis, value] of camera.position.entries()) {
+    assert.ok(Math.abs(value - frontCamera.position[axis]) < 1e-4);
+  }
   assert.equal(await second.page.getByLabel("Show").inputValue(), "t");
   await checkTroubles(second.page, second.troubles);
   await second.page.close();
@@ -274,7 +309,10 @@ test("the picture comes back after the graphics context was lost", { timeout }, 
   const { page, close } = await openEditor();
   const before = await countPixels(page);
   await page.evaluate(async () => {
-    const context = document.querySelector("canvas.viewport-canvas").getContext("webgl2").getExtension("WEBGL_lose_context");
+    const context = document
+      .querySelector("canvas.viewport-canvas")
+      .getContext("webgl2")
+      .getExtension("WEBGL_lose_context");
     context.loseContext();
     await new Promise((done) => setTimeout(done, 600));
     context.restoreContext();
@@ -282,6 +320,9 @@ test("the picture comes back after the graphics context was lost", { timeout }, 
   await page.waitForTimeout(600);
   await waitForIdle(page, waitMs);
   const after = await countPixels(page);
-  assert.ok(Math.abs(after.surface - before.surface) < 0.05 * before.surface, `${after.surface} of ${before.surface} pixels`);
+  assert.ok(
+    Math.abs(after.surface - before.surface) < 0.05 * before.surface,
+    `${after.surface} of ${before.surface} pixels`,
+  );
   await close();
 });

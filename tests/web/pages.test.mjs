@@ -2,17 +2,30 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { waitForIdle } from "../../web/scripts/browser.mjs";
-import { axePath, capsulePly, checkTroubles, createSession, json, openBrowser, sessionUrl, startService, waitMs } from "./support.mjs";
+import {
+  axePath,
+  capsulePly,
+  checkTroubles,
+  createSession,
+  json,
+  openBrowser,
+  sessionUrl,
+  startService,
+  waitMs,
+} from "./support.mjs";
 
 const timeout = 600_000;
 let service;
 let browser;
 let open;
 
-before(async () => {
-  service = await startService();
-  ({ browser, open } = await openBrowser());
-}, { timeout });
+before(
+  async () => {
+    service = await startService();
+    ({ browser, open } = await openBrowser());
+  },
+  { timeout },
+);
 
 after(async () => {
   await browser?.close();
@@ -22,7 +35,9 @@ after(async () => {
 async function seriousFindings(page) {
   // Through the debugger, as the content security policy lets no script be added.
   await page.evaluate(await (await import("node:fs/promises")).readFile(axePath, "utf8"));
-  const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
+  const { violations } = await page.evaluate(() =>
+    globalThis.axe.run(document, { resultTypes: ["violations"] }),
+  );
   return violations
     .filter(({ impact }) => impact === "serious" || impact === "critical")
     .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(" | ")}`);
@@ -50,7 +65,11 @@ test("an uploaded file becomes a cloud and opens its session", { timeout }, asyn
 
 test("a file that is no cloud is refused with its reason", { timeout }, async () => {
   const { page } = await open(`${service.url}/`);
-  const file = { name: "broken.ply", mimeType: "application/octet-stream", buffer: capsulePly(5000).subarray(0, 30_000) };
+  const file = {
+    name: "broken.ply",
+    mimeType: "application/octet-stream",
+    buffer: capsulePly(5000).subarray(0, 30_000),
+  };
   await page.locator('input[type="file"]').setInputFiles(file);
   const card = page.locator(".problem-card");
   await card.waitFor({ timeout: waitMs });

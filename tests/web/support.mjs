@@ -21,7 +21,8 @@ export function capsulePly(count) {
     // The capsule of radius 0.4 about the segment from x = -0.8 to 0.8, cut into equal areas along x.
     const x = -1.2 + (2.4 * (i + 0.5)) / count;
     const off = Math.max(0, Math.abs(x) - 0.8);
-    const radius = Math.sqrt(Math.max(0, 0.16 - off * off)) * (1 + 0.012 * Math.sin(25 * x) * Math.sin(6 * golden * i));
+    const radius =
+      Math.sqrt(Math.max(0, 0.16 - off * off)) * (1 + 0.012 * Math.sin(25 * x) * Math.sin(6 * golden * i));
     body.writeFloatLE(x, 12 * i);
     body.writeFloatLE(radius * Math.cos(golden * i), 12 * i + 4);
     body.writeFloatLE(radius * Math.sin(golden * i), 12 * i + 8);
@@ -32,7 +33,8 @@ export function capsulePly(count) {
 /** A JSON answer of the daemon; throws where it refuses. */
 export async function json(url, init) {
   const response = await fetch(url, init);
-  if (!response.ok) throw new Error(`${init?.method ?? "GET"} ${url}: ${response.status} ${await response.text()}`);
+  if (!response.ok)
+    throw new Error(`${init?.method ?? "GET"} ${url}: ${response.status} ${await response.text()}`);
   return response.json();
 }
 
@@ -92,7 +94,9 @@ export function sessionUrl(service, session, hash = "") {
 
 /** Waits until the viewer shows at least `revision` and rests. */
 export async function waitForRevision(page, revision) {
-  await page.waitForFunction((wanted) => globalThis.pointwright?.status.revision >= wanted, revision, { timeout: waitMs });
+  await page.waitForFunction((wanted) => globalThis.pointwright?.status.revision >= wanted, revision, {
+    timeout: waitMs,
+  });
   await waitForIdle(page, waitMs);
 }
 
