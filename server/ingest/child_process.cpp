@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/ingest/sandbox.h"
+
 namespace pointwright {
 namespace {
 
@@ -67,9 +69,10 @@ void reset_signals(SpawnPlan& plan) {
 void set_descriptors(SpawnPlan& plan, const std::array<Descriptor, 3>& far) {
   plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0));
   plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0));
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0));
-#endif
+  // A sanitizer's report is worth having.
+  if (!kSanitizedBuild) {
+    plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0));
+  }
   for (std::size_t i = 0; i < far.size(); ++i) {
     plan.require(posix_spawn_file_actions_adddup2(&plan.actions, far[i].get(), static_cast<int>(3 + i)));
   }

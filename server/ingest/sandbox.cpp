@@ -13,23 +13,8 @@
 #include <csignal>
 #include <cstddef>
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define POINTWRIGHT_SANITIZED 1
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define POINTWRIGHT_SANITIZED 1
-#endif
-
 namespace pointwright {
 namespace {
-
-#ifdef POINTWRIGHT_SANITIZED
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 bool lower_limit(decltype(RLIMIT_AS) which, std::uint64_t value) {
   rlimit now{};
@@ -53,19 +38,19 @@ std::uint64_t address_space_bytes() {
 }
 
 bool limit_address_space(std::uint64_t base, std::uint64_t extra) {
-  if (kSanitized) return true;
+  if (kSanitizedBuild) return true;
   return base > 0 && lower_limit(RLIMIT_AS, base + extra);
 }
 
 bool limit_resources(std::uint64_t cpu_seconds, std::uint64_t output_bytes) {
   return prctl(PR_SET_PDEATHSIG, SIGKILL) == 0 && lower_limit(RLIMIT_CPU, cpu_seconds) &&
          lower_limit(RLIMIT_FSIZE, output_bytes) && lower_limit(RLIMIT_CORE, 0) &&
-         (kSanitized || lower_limit(RLIMIT_NPROC, 0));
+         (kSanitizedBuild || lower_limit(RLIMIT_NPROC, 0));
 }
 
 bool forbid_system_calls() {
   if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return false;
-  if (kSanitized) return true;
+  if (kSanitizedBuild) return true;
   constexpr std::array kAllowed{SCMP_SYS(read),         SCMP_SYS(write),        SCMP_SYS(munmap),
                                 SCMP_SYS(mremap),       SCMP_SYS(brk),          SCMP_SYS(madvise),
                                 SCMP_SYS(exit),         SCMP_SYS(exit_group),   SCMP_SYS(close),

@@ -3,7 +3,22 @@
 
 #include <cstdint>
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define POINTWRIGHT_SANITIZED_BUILD 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define POINTWRIGHT_SANITIZED_BUILD 1
+#endif
+#endif
+
 namespace pointwright {
+
+/// Built with a sanitizer whose run-time library needs more than a sandbox leaves.
+#ifdef POINTWRIGHT_SANITIZED_BUILD
+inline constexpr bool kSanitizedBuild = true;
+#else
+inline constexpr bool kSanitizedBuild = false;
+#endif
 
 /// Bytes of address space that this process has now.
 std::uint64_t address_space_bytes();

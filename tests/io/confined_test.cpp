@@ -8,16 +8,11 @@
 #include <string>
 #include <thread>
 
+#include "server/ingest/sandbox.h"
 #include "tests/io/io_support.h"
 
 namespace pointwright::io_test {
 namespace {
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 ConfineLimits limits() {
   ConfineLimits result;
@@ -116,7 +111,7 @@ TEST_CASE("bombs are refused without the daemon growing") {
 TEST_CASE("memory, time and queue have their limits") {
   const auto bytes =
       write_cloud(sphere(200'000).cloud, CloudFormat::kDraco, {.draco_position_bits = 14}).value();
-  if (!kSanitized) {
+  if (!kSanitizedBuild) {
     ConfineLimits narrow = limits();
     narrow.memory_bytes = 1 << 20;
     const auto refused = read_confined(bytes, CloudFormat::kDraco, {}, narrow);

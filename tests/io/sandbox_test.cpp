@@ -12,12 +12,6 @@
 namespace pointwright {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
-
 ChildEnd run(const char* misdeed, double deadline = 20.0, const ExecutionContext* context = nullptr) {
   const Descriptor input(memfd_create("input", MFD_CLOEXEC));
   const Descriptor output(memfd_create("output", MFD_CLOEXEC));
@@ -32,7 +26,7 @@ ChildEnd run(const char* misdeed, double deadline = 20.0, const ExecutionContext
 }
 
 TEST_CASE("a confined process that opens, connects, forks, kills, runs or writes code dies of it") {
-  if (kSanitized) return;
+  if (kSanitizedBuild) return;
   for (const char* misdeed : {"--open", "--socket", "--fork", "--kill", "--execute", "--code"}) {
     CAPTURE(misdeed);
     CHECK(run(misdeed).signal == SIGSYS);
@@ -41,7 +35,7 @@ TEST_CASE("a confined process that opens, connects, forks, kills, runs or writes
 
 TEST_CASE("a confined process has so much time, memory and output and no more") {
   CHECK(run("--spin").signal != 0);
-  if (kSanitized) return;
+  if (kSanitizedBuild) return;
   CHECK(run("--memory").status == 20);  // std::bad_alloc, not the machine's last page
   CHECK(run("--output").signal == SIGXFSZ);
 }
