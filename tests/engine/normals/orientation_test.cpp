@@ -72,16 +72,17 @@ TEST_CASE("a thin plate is right on both sides and around its rim") {
   // About four spacings thick in the middle; the rim's radius is a fifteenth of a spacing.
   const Surface plate = ellipsoid(30'000, {1.0, 1.0, 0.03});
   CHECK(count_opposed(orient_scrambled(plate).normal, plate.normal) == 0);
-  // Along the rim estimated normals are as good as random.
+  // Along the rim, where the sheets come closer than one and a half spacings, estimated normals are as good
+  // as random.
   const Oriented found = estimate_and_orient(plate.position);
   std::size_t opposed = 0;
   std::size_t judged = 0;
   for (std::size_t i = 0; i < plate.size(); ++i) {
-    if (std::abs(plate.normal[i].z()) < 0.7F) continue;
+    if (std::abs(plate.position[i].z()) < 0.01F) continue;
     ++judged;
     opposed += found.normal[i].dot(plate.normal[i]) < 0.0F ? 1U : 0U;
   }
-  CHECK(judged > plate.size() * 95 / 100);
+  CHECK(judged > plate.size() * 80 / 100);
   // Measured: 2 of 29,000, beside the rim, where the tangent plane is not the surface's.
   CHECK(opposed * 5000 <= judged);
 }

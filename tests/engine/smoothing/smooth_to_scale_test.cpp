@@ -63,7 +63,7 @@ TEST_CASE("a wave is attenuated as by a Gaussian of that standard deviation") {
                 << ", wavelength " << wavelength << ": " << run.attenuation << ", expected " << expected
                 << ", effective scale " << effective);
         // The amplitude within ten per cent where the wave is long. Where only a quarter of it is left,
-        // clumps, which smooth less than the median, keep a little more of it: the scale is within seven per
+        // clumps, which smooth less than the median, keep a little more of it: the scale is within nine per
         // cent still.
         CHECK(relative_error(effective, 1.0) < 0.1);
         if (wavelength > 20.0) CHECK(relative_error(run.attenuation, expected) < 0.10);
@@ -119,7 +119,7 @@ TEST_CASE("a cloud that is too small for the scale is smoothed as far as it goes
 }
 
 TEST_CASE("a scale that needs too many iterations is refused with the greatest that can be had") {
-  const Surface surface = plane(40, 1.0, Sampling::kJittered);
+  const Surface surface = plane(12, 1.0, Sampling::kJittered);
   const auto result =
       smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 4), 1e4F,
                       SmoothingDirection::kAlongNormal);

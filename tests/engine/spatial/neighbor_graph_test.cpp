@@ -162,12 +162,11 @@ TEST_CASE("local spacing is the square root of the area per sample") {
     Sampling sampling;
     double tolerance;
   };
-  // One sample's r_k is quantised on a lattice and scatters by 1 / (2 sqrt k) on random samples; the median
-  // over many, away from the border, is within a few per cent, worst on the exact lattice, where r_10 is
-  // always 2 h.
+  // The median over many samples, away from the border. On a lattice r_10 is always 2 h, which is 9 % too
+  // much; of random samples the median of r_k^2 is (k - 1/3) h^2 / pi, which makes h 4 % too small.
   for (const Case& c :
        {Case{"regular", Sampling::kRegular, 0.10}, Case{"jittered", Sampling::kJittered, 0.04},
-        Case{"random", Sampling::kRandom, 0.04}}) {
+        Case{"random", Sampling::kRandom, 0.06}}) {
     for (const double spacing : {0.01, 3.0}) {
       CAPTURE(c.name);
       CAPTURE(spacing);
