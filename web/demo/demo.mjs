@@ -77,9 +77,12 @@ async function preview(url, session, sequence, revision) {
 function takePicture(url, sessionId, name, mode) {
   const file = resolve(out, name);
   const args = ["web/scripts/pictures.mjs", "--url", url, "--session", sessionId, "--out", file];
-  args.push("--camera", JSON.stringify(camera), "--mode", mode, "--size", "1600x1000", "--ui", "0");
+  args.push("--camera", JSON.stringify(camera), "--mode", mode, "--size", "1280x800", "--ui", "0");
   return new Promise((done, fail) => {
     const child = spawn(process.execPath, args, { cwd: root, stdio: ["ignore", "pipe", "pipe"] });
+    const endWithUs = () => child.kill();
+    process.once("exit", endWithUs);
+    child.on("close", () => process.off("exit", endWithUs));
     let text = "";
     child.stdout.on("data", (chunk) => (text += chunk));
     child.stderr.on("data", (chunk) => (text += chunk));
