@@ -11,7 +11,7 @@
 
 namespace pointwright {
 
-/// Why an operation of the engine could not be done. server/http/error_map.cpp maps each to a status.
+/// Why an operation of the engine could not be done. protocol/json/problem.cpp maps each to a status.
 enum class ErrorCode {
   kInvalidArgument,    ///< a parameter is outside its stated range; `field` names it
   kMalformedData,      ///< bytes that are not what they claim to be
@@ -37,10 +37,10 @@ struct Error {
 template <typename T>
 class [[nodiscard]] Result {
  public:
-  Result(T value)
-      : state_(std::in_place_index<0>, std::move(value)) {}  // NOLINT(google-explicit-constructor)
-  Result(Error error)
-      : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT(google-explicit-constructor)
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}
 
   [[nodiscard]] bool ok() const { return state_.index() == 0; }
   explicit operator bool() const { return ok(); }
