@@ -122,6 +122,31 @@ TEST_CASE("other radii over the same centres give the same region as building it
   check_exact(region, centers, radii, test::random_points(200, 23));
 }
 
+TEST_CASE("limits cut distances off and change nothing below") {
+  const Points centers = test::random_points(2000, 25);
+  const std::vector<float> radii = random_radii(2000, 26, 0.02F);
+  const Region region(centers, radii);
+  const Points queries = test::random_points(500, 27, 1.5F);
+  std::vector<float> limits(padded_to_block(500), 0.0F);
+  for (std::size_t i = 0; i < limits.size(); ++i) limits[i] = 0.01F * static_cast<float>(i % 20);
+  RegionDistances free;
+  RegionDistances limited;
+  region.distances(queries, 0, 500, free);
+  region.distances(queries, 0, 500, limited, &limits);
+  std::size_t below = 0;
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < 500; ++i) {
+    wrong += limited.distance[i] != std::min(free.distance[i], limits[i]);
+    const bool is_below = free.distance[i] < limits[i];
+    below += is_below ? 1 : 0;
+    if (free.distance[i] == limits[i]) continue;
+    wrong += limited.gradient[i] != (is_below ? free.gradient[i] : Vec3f(0, 0, 0));
+  }
+  CHECK(wrong == 0);
+  CHECK(below > 50);
+  CHECK(below < 400);
+}
+
 TEST_CASE("a region without balls has no distance") {
   const Region region;
   std::uint32_t hint = 0;

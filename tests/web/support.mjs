@@ -128,12 +128,14 @@ export async function countPixels(page) {
     const { data: pixels } = context.getImageData(0, 0, bitmap.width, bitmap.height);
     const result = { blue: 0, red: 0, surface: 0, top: 1, bottom: 0, left: 1, right: 0, redY: 0, redX: 0 };
     for (let y = 0; y < bitmap.height; y++) {
-      for (let x = 0; x < bitmap.width; x++) {
+      // The tools lie over the left edge.
+      for (let x = 70; x < bitmap.width; x++) {
         const at = 4 * (y * bitmap.width + x);
         const [r, g, b] = [pixels[at], pixels[at + 1], pixels[at + 2]];
         const blue = b > 70 && b > 1.6 * r && b > 1.2 * g;
         const red = r > 70 && r > 1.7 * g && r > 1.7 * b;
-        const clay = r > 75 && Math.abs(r - b) < 60 && r >= b - 8;
+        // The background is darker than any lit place of the surface.
+        const clay = Math.max(r, g, b) > 60;
         if (blue) result.blue++;
         if (red) {
           result.red++;

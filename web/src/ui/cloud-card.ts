@@ -115,29 +115,22 @@ function sessionRow(session: SessionSummary, options: CloudCardOptions): HTMLEle
   );
 }
 
-const CONFIRM_MS = 3000;
-
-/** Deletes at the second press: the first only asks. */
+/** Deletes at the second press: the first only asks, until the hand or the focus goes elsewhere. */
 function confirmButton(label: string, action: () => void): HTMLElement {
   const button = h(
     "button",
     { type: "button", class: "icon-button small delete", title: label, aria: { label } },
     icon("trash"),
   );
-  let armed = 0;
+  const arm = (armed: boolean): void => {
+    button.classList.toggle("armed", armed);
+    button.setAttribute("aria-label", armed ? `${label}: press again to confirm` : label);
+  };
   button.addEventListener("click", () => {
-    if (armed !== 0) {
-      clearTimeout(armed);
-      action();
-      return;
-    }
-    button.classList.add("armed");
-    button.setAttribute("aria-label", `${label}: press again to confirm`);
-    armed = window.setTimeout(() => {
-      armed = 0;
-      button.classList.remove("armed");
-      button.setAttribute("aria-label", label);
-    }, CONFIRM_MS);
+    if (button.classList.contains("armed")) action();
+    else arm(true);
   });
+  button.addEventListener("blur", () => arm(false));
+  button.addEventListener("pointerleave", () => arm(false));
   return button;
 }
