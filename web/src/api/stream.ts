@@ -108,8 +108,8 @@ export class StreamParser {
 }
 
 const RETRY_MS = [300, 800, 2000, 5000];
-/** The server sends heartbeats; a stream silent for longer than this is taken for dead. */
-const SILENCE_MS = 45_000;
+/** The server sends heartbeats, at least one a minute; a stream silent for longer than this is taken for dead. */
+const SILENCE_MS = 75_000;
 
 export interface StreamStatus {
   onState(state: "live" | "connecting" | "lost", error?: unknown): void;
