@@ -208,6 +208,7 @@ void ExportView::choose_names() {
     }
     taken.insert({texcoord_names_[0], texcoord_names_[1]});
   }
+  scalar_names_.reserve(cloud_.scalars.size());
   for (const auto& scalar : cloud_.scalars) {
     std::string name = clean_name(scalar.name);
     while (!taken.insert(name).second) name = "scalar_" + name;

@@ -67,6 +67,7 @@ class ColumnReader {
       base = clean_name(name);
     if (components == 1) return {base};
     std::vector<std::string> names;
+    names.reserve(static_cast<std::size_t>(components));
     for (int c = 0; c < components; ++c) names.push_back(base + "_" + std::to_string(c));
     return names;
   }

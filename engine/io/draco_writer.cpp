@@ -35,7 +35,7 @@ class CloudBuilder {
 
   // One attribute of `components` values of type T a sample; put(sample, out) writes them. Returns its id.
   template <typename T, typename Put>
-  int add(draco::GeometryAttribute::Type kind, std::int8_t components, const Put& put) {
+  int add(draco::GeometryAttribute::Type kind, std::uint8_t components, const Put& put) {
     draco::GeometryAttribute shape;
     const auto stride = static_cast<std::int64_t>(sizeof(T)) * components;
     shape.Init(kind, nullptr, components, data_type_of<T>(), false, stride, 0);
@@ -107,7 +107,7 @@ void add_standard_columns(const Cloud& cloud, CloudBuilder& builder) {
     });
   }
   if (cloud.has_colors()) {
-    const std::int8_t channels = cloud.color_has_alpha ? 4 : 3;
+    const std::uint8_t channels = cloud.color_has_alpha ? 4 : 3;
     builder.add<std::uint8_t>(draco::GeometryAttribute::COLOR, channels,
                               [&](std::uint32_t i, std::uint8_t* out) {
                                 std::copy(cloud.color[i].begin(), cloud.color[i].begin() + channels, out);

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -30,6 +30,11 @@ Position file_position(const Cloud& cloud, std::size_t i) {
     result[axis] = origin == 0.0 ? static_cast<double>(p[axis]) : origin + static_cast<double>(p[axis]);
   }
   return result;
+}
+
+std::array<std::uint64_t, 3> bits_of(const Position& p) {
+  return {std::bit_cast<std::uint64_t>(p[0]), std::bit_cast<std::uint64_t>(p[1]),
+          std::bit_cast<std::uint64_t>(p[2])};
 }
 
 bool is_finite(const Position& p) {
@@ -181,8 +186,7 @@ void recentre(Cloud& cloud, const Range& range) {
   const auto changed = parallel_sum<std::size_t>(cloud.size(), 0, [&](std::size_t begin, std::size_t end) {
     std::size_t count = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      const Position again = file_position(cloud, i);
-      if (std::memcmp(again.data(), exact[i].data(), sizeof(Position)) != 0) ++count;
+      if (bits_of(file_position(cloud, i)) != bits_of(exact[i])) ++count;
     }
     return count;
   });
@@ -247,8 +251,13 @@ Result<ImportedCloud> finish_cloud(ImportedCloud decoded, const ImportParams& pa
     if (auto finite = drop_or_refuse_non_finite(imported, params); !finite) return finite.error();
     range = range_of(cloud);
   }
-  const bool is_double = cloud.position_is_double || !cloud.origin.isZero(0.0);
-  if (auto checked = check_range(range, is_double); !checked) return checked.error();
+  // A file with an origin of its own resolves places that float32 in model space would not: such a cloud
+  // leaves as float64, too, or it could not come back.
+  const bool has_origin = !cloud.origin.isZero(0.0);
+  if (auto checked = check_range(range, cloud.position_is_double || has_origin); !checked)
+    return checked.error();
+  if (has_origin && range.extent() < kLeastExtentFloat * range.farthest().maxCoeff())
+    cloud.position_is_double = true;
   recentre(cloud, range);
   cloud = permuted(cloud, coherent_order(cloud.position));
   imported.report.sample_count = cloud.size();

@@ -28,6 +28,7 @@ struct Table {
 Table make_table(const PlyElement& element) {
   Table table;
   table.columns.reserve(element.properties.size());
+  table.of_property.reserve(element.properties.size());
   for (const PlyProperty& property : element.properties) {
     table.of_property.push_back(nullptr);
     if (property.is_list) continue;

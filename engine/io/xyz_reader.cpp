@@ -233,6 +233,7 @@ class XyzReader {
     constexpr std::array<const char*, 10> kStandard{"x",  "y",   "z",     "nx",   "ny",
                                                     "nz", "red", "green", "blue", "alpha"};
     std::vector<std::string> names;
+    names.reserve(names_.size());
     for (const std::string& name : names_) {
       std::string low = lower_case(name);
       for (const auto& [brief, full] : kShort) {
@@ -252,6 +253,7 @@ class XyzReader {
     const bool named = names_.size() == columns_.size() && has("x") && has("y") && has("z");
     const std::vector<std::string> names = named ? given_names() : guessed_names();
     std::vector<ScalarAttribute> result;
+    result.reserve(columns_.size());
     for (std::size_t c = 0; c < columns_.size(); ++c) {
       const bool is_color =
           names[c] == "red" || names[c] == "green" || names[c] == "blue" || names[c] == "alpha";

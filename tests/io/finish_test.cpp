@@ -151,5 +151,21 @@ TEST_CASE("a limit on samples holds for whatever was decoded") {
         ErrorCode::kTooLarge);
 }
 
+TEST_CASE("a small object that only the file's own origin resolves leaves as float64") {
+  auto assembled = assemble_cloud(
+      {{"x", std::vector<float>{0, 1}}, {"y", std::vector<float>{0, 1}}, {"z", std::vector<float>{0, 1}}},
+      {});
+  REQUIRE(assembled.ok());
+  ImportedCloud decoded = std::move(assembled).value();
+  decoded.cloud.origin = Vec3d(665000, 5648000, 0);
+  const auto finished = finish_cloud(std::move(decoded), {});
+  REQUIRE(finished.ok());
+  CHECK(finished.value().cloud.position_is_double);
+  for (const auto format : {CloudFormat::kPly, CloudFormat::kDraco}) {
+    const Cloud again = through(finished.value().cloud, format).cloud;
+    CHECK(model_position(in_caller_order(again), 1) == Vec3d(665001, 5648001, 1));
+  }
+}
+
 }  // namespace
 }  // namespace pointwright::io_test
