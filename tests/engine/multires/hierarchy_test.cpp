@@ -69,14 +69,14 @@ Surface rippled(const Surface& surface) {
 }
 
 TEST_CASE("reconstruction without a deformation gives the input back") {
-  const std::vector<Surface> surfaces{sphere(10'000, 1.0, Sampling::kRandom),
-                                      rippled(torus(20'000, 1.0, 0.4, Sampling::kRegular)),
-                                      wave(100, 0.02, Sampling::kJittered, 0.03, 0.4),
-                                      bumpy_sphere(10'000, {}),
-                                      cube(40, 1.0),
-                                      parallel_sheets(60, 0.02, 0.03, Sampling::kRandom),
-                                      with_noise(hemisphere(8'000, 1.0), 0.01),
-                                      plane(60, 1.0, Sampling::kRegular)};
+  const std::vector<Surface> surfaces{sphere(5'000, 1.0, Sampling::kRandom),
+                                      rippled(torus(10'000, 1.0, 0.4, Sampling::kRegular)),
+                                      wave(70, 0.03, Sampling::kJittered, 0.03, 0.4),
+                                      bumpy_sphere(6'000, {}),
+                                      cube(25, 1.0),
+                                      parallel_sheets(40, 0.02, 0.03, Sampling::kRandom),
+                                      with_noise(hemisphere(4'000, 1.0), 0.01),
+                                      plane(40, 1.0, Sampling::kRegular)};
   for (const Surface& surface : surfaces) {
     for (const Cloud& cloud : {to_cloud(surface.position), to_cloud(surface)}) {
       for (const float scale : {0.0001F, 0.01F, 0.05F}) {

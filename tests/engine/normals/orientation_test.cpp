@@ -82,7 +82,7 @@ TEST_CASE("a thin plate is right on both sides and around its rim") {
     ++judged;
     opposed += found.normal[i].dot(plate.normal[i]) < 0.0F ? 1U : 0U;
   }
-  CHECK(judged > plate.size() * 80 / 100);
+  CHECK(judged > plate.size() * 60 / 100);
   // Measured: 2 of 29,000, beside the rim, where the tangent plane is not the surface's.
   CHECK(opposed * 5000 <= judged);
 }
