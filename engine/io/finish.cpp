@@ -256,8 +256,8 @@ Result<ImportedCloud> finish_cloud(ImportedCloud decoded, const ImportParams& pa
   const bool has_origin = !cloud.origin.isZero(0.0);
   if (auto checked = check_range(range, cloud.position_is_double || has_origin); !checked)
     return checked.error();
-  if (has_origin && range.extent() < kLeastExtentFloat * range.farthest().maxCoeff())
-    cloud.position_is_double = true;
+  const double least = kLeastExtentFloat * range.farthest().maxCoeff();
+  if (has_origin && range.extent() > 0.0 && range.extent() < least) cloud.position_is_double = true;
   recentre(cloud, range);
   cloud = permuted(cloud, coherent_order(cloud.position));
   imported.report.sample_count = cloud.size();
