@@ -66,7 +66,7 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     { group: "Brush", keys: "Right Drag", label: "Orbit while painting" },
     {
       group: "Transform",
-      keys: "0 – 9",
+      keys: "0…9",
       label: "Type the amount",
       matches: (event) =>
         transforming() && editor.state.axis !== null && /^[0-9.-]$/.test(event.key) && key(event.key)(event),
@@ -90,7 +90,7 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
         else bus.invoke("tool.activate", "orbit");
       },
     },
-    { group: "Transform", keys: "Double click", label: "Set the pivot on the surface" },
+    { group: "Transform", keys: "Double-click", label: "Set the pivot on the surface" },
     {
       group: "History",
       keys: "Ctrl Z",

@@ -67,13 +67,14 @@ export function worldPerPixel(depth: number, heightPixels: number, fovDeg = FIEL
 
 const DIGITS = 6;
 
-function encodeVector(vector: Vec3): string {
-  return vector.map((value) => String(Number(value.toPrecision(DIGITS)))).join(",");
-}
-
-/** A camera as the URL's hash carries it: position, target, up. */
+/** A camera as the URL's hash carries it: position, target, up; what is tiny beside the view is nothing. */
 export function encodeCamera(camera: CameraState): string {
-  return [camera.position, camera.target, camera.up].map(encodeVector).join(";");
+  const size = Math.max(...camera.position.map(Math.abs), ...camera.target.map(Math.abs), Number.MIN_VALUE);
+  const encode = (vector: Vec3, unit: number): string =>
+    vector
+      .map((value) => String(Math.abs(value) < unit * 10 ** -DIGITS ? 0 : Number(value.toPrecision(DIGITS))))
+      .join(",");
+  return [encode(camera.position, size), encode(camera.target, size), encode(camera.up, 1)].join(";");
 }
 
 /** The camera of a hash value; null where it is not nine finite numbers that make a camera. */

@@ -45,8 +45,14 @@ test("a pixel's span grows with the distance", () => {
 });
 
 test("a camera survives the link", () => {
-  const camera = { position: [1.25, -3e-5, 7e6], target: [0, 0.5, 0], up: [0, 1, 0] } as const;
+  const camera = { position: [1.25, -3e-5, 7.125], target: [0, 0.5, 0], up: [0, 1, 0] } as const;
   expect(decodeCamera(encodeCamera(camera))).toEqual(camera);
+});
+
+test("what is tiny beside the view is left out of the link", () => {
+  expect(encodeCamera({ position: [3.7e-16, 0, 6], target: [0, -1e-17, 0], up: [0, 1, 0] })).toBe(
+    "0,0,6;0,0,0;0,1,0",
+  );
 });
 
 test("what is no camera is none", () => {
