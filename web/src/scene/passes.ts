@@ -3,6 +3,7 @@ import {
   BufferGeometry,
   CustomBlending,
   DataTexture,
+  DepthTexture,
   Float32BufferAttribute,
   FloatType,
   GLSL3,
@@ -20,6 +21,7 @@ import {
   RGFormat,
   Scene,
   UnsignedByteType,
+  UnsignedIntType,
   Vector2,
   type Vector3,
   type WebGLRenderer,
@@ -56,6 +58,8 @@ function screenMaterial(
 
 /** The render targets and shader passes from samples to the picture. Every matrix is the camera's that renders. */
 export class Passes {
+  /** Of the first pass; the second one tests against it, so that what is hidden costs nothing there. */
+  private readonly depth_ = new DepthTexture(1, 1, UnsignedIntType);
   /** Slot + 1 and distance of what is in front: for picking, lighting and the brush. */
   readonly surfaceTarget = new WebGLRenderTarget(1, 1, {
     format: RGFormat,
@@ -63,6 +67,7 @@ export class Passes {
     minFilter: NearestFilter,
     magFilter: NearestFilter,
     depthBuffer: true,
+    depthTexture: this.depth_,
   });
   readonly attributeTarget = new WebGLRenderTarget(1, 1, {
     count: 2,
@@ -70,7 +75,8 @@ export class Passes {
     type: HalfFloatType,
     minFilter: NearestFilter,
     magFilter: NearestFilter,
-    depthBuffer: false,
+    depthBuffer: true,
+    depthTexture: this.depth_,
   });
   private readonly picture_ = new WebGLRenderTarget(1, 1, {
     format: RGBAFormat,
@@ -129,7 +135,7 @@ export class Passes {
       blendDst: OneFactor,
       blendSrcAlpha: OneFactor,
       blendDstAlpha: OneFactor,
-      depthTest: false,
+      depthTest: true,
       depthWrite: false,
     });
     this.shadeMaterial_ = screenMaterial(SHADE_FRAGMENT, this.uniforms.shade, NormalBlending);

@@ -104,7 +104,7 @@ void main() {
     float rim = edge * max(0.0, dot(n, RIM) + 0.55);
     vec3 light = ambient + vec3(1.06, 1.0, 0.91) * key * mix(0.62, 1.0, open) + vec3(0.15, 0.19, 0.25) * fill;
     float shine = pow(max(0.0, dot(n, normalize(KEY + eye))), 34.0) * 0.085;
-    vec3 lit = base * light + (vec3(0.30, 0.36, 0.44) * rim * 0.55 + shine) * open;
+    vec3 lit = base * light + (vec3(0.30, 0.36, 0.44) * rim * 0.36 + shine) * open;
     vec3 plain = base * (0.42 + 0.58 * mix(max(0.0, dot(n, eye)), key, 0.35)) * mix(0.7, 1.0, open);
     color = mix(lit, plain, dataMode);
     if (edl > 0.0) color *= mix(eyeDome(pixel, depth, spin), 1.0, 0.18);

@@ -157,6 +157,9 @@ void main() {
     else if (mark > 0.5) albedo = mix(albedo, zeroColor, 0.86);
   }
   vAlbedo = albedo;
+  // Tested against the first pass's depth where the disc could at most be in front: what is wholly hidden ends here.
+  vec4 nearest = projectionMatrix * vec4(vCenter.xy, vCenter.z + 1.75 * vRadius, 1.0);
+  gl_Position.z = nearest.w > 0.0 ? max(nearest.z / nearest.w, -1.0) * gl_Position.w : -gl_Position.w;
 }
 `;
 
