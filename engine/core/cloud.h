@@ -55,7 +55,8 @@ struct Cloud {
 Vec3d model_position(const Cloud& cloud, std::size_t i);
 
 /// All columns of the cloud in another order: sample i of the result is sample order[i] of the input.
-/// Pre: order is a permutation of 0..N-1 (or of a subset: then the result is that subset). Cost: O(N).
+/// Pre:  order is a permutation of 0..N-1 (or of a subset: then the result is that subset)
+/// Cost: O(N)
 Cloud permuted(const Cloud& cloud, const std::vector<std::uint32_t>& order);
 
 /// The cloud in its caller's order (ascending id). Cost: O(N).

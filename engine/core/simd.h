@@ -1,18 +1,15 @@
 #pragma once
 // Vectors of the machine's width for kernel sources. Every operation rounds as IEEE 754 says and lanes never
-// mix, so a kernel gives the same bytes at every width: no reciprocal estimates, no fused operations, no
-// libm.
+// mix, so a kernel gives the same bytes at every width: no reciprocal estimates, fused operations or libm.
 //
 // How to write a kernel (see engine/core/simd_dispatch.h for the caller's side):
 //   - the source is `x_kernels.inc`; CMake compiles it once per instruction set by pointwright_add_kernels();
 //   - it includes this header, <cstddef>, <cstdint> and its own argument structs, nothing else: an inline
-//   function
-//     of a shared header that is compiled with AVX-512 here may be the copy that the linker keeps for
-//     everyone;
+//     function of a shared header that is compiled with AVX-512 here may be the copy that the linker keeps
+//     for everyone;
 //   - everything stands in namespace pointwright::POINTWRIGHT_SIMD_NAMESPACE; arguments are raw pointers to
-//   columns
-//     padded to kSimdBlock (16) samples; loops run `for (i = begin; i < end; i += kWidth)` between whole
-//     blocks;
+//     columns padded to kSimdBlock (16) samples; loops run `for (i = begin; i < end; i += kWidth)` between
+//     whole blocks;
 //   - branches on any()/all() may skip work, never change what a lane computes.
 
 #include <cstddef>

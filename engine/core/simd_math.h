@@ -11,8 +11,8 @@ struct SinCos {
   F cos;
 };
 
-/// Sine and cosine of (quadrant + r / (pi / 2)) quarter turns, r in radians. Pre: |r| <= pi / 4 (1 + 1e-4).
-/// Exact at r = 0. Errors below 1e-7.
+/// Sine and cosine of (quadrant + r / (pi / 2)) quarter turns, r in radians. Errors below 1e-7, 0 at r = 0.
+/// Pre: |r| <= pi / 4 (1 + 1e-4)
 POINTWRIGHT_SIMD_INLINE SinCos sincos_quadrant(F r, I quadrant) {
   const F z = r * r;
   const F s = r + r * z * (-0.166666641831398F + z * (0.008332747966051102F + z * -0.000195878412341699F));

@@ -39,8 +39,7 @@ Vec3d deform_point(const Deformation& deformation, const Vec3d& p, double t);
 /// The Jacobian dF/dp + dF/dt grad(t)^T of p -> F(p, t(p)) at one point, in double precision (reference).
 Mat3d deformation_jacobian(const Deformation& deformation, const Vec3d& p, double t, const Vec3d& t_gradient);
 
-/// Deforms all samples and their normals: position' = F(position, t), normal' = cofactor(J)
-/// normal, normalised.
+/// Deforms samples and their normals: position' = F(position, t), normal' = cofactor(J) normal, normalised.
 /// Samples with t = 0 keep their bits, and so do samples that F leaves in place (a zero vector, whole turns)
 /// with a gradient that does not bend them. Where J folds the surface (the normal vanishes) the normal turns
 /// with dF/dp. A position is within 5e-7 of deform_point, relative to its distance from the axis and to its

@@ -23,7 +23,8 @@ std::vector<std::byte> cloud_blob(const ImportedCloud& imported);
 
 /// Reads a blob that may come from anywhere: every size is checked against the bytes there are before it is
 /// believed; columns agree in length, names are clean, ids are a permutation. Values are not checked (see
-/// finish_cloud()). Errors: kMalformedData
+/// finish_cloud()).
+/// Errors: kMalformedData
 Result<ImportedCloud> read_cloud_blob(std::span<const std::byte> bytes);
 
 }  // namespace pointwright

@@ -24,8 +24,8 @@ std::string_view format_name(CloudFormat format);  ///< "draco", "ply", "xyz"
 
 /// What to do with what was read.
 struct ImportParams {
-  std::uint64_t max_samples =
-      50'000'000;                ///< kTooLarge beyond, from the header, before anything is allocated
+  /// kTooLarge beyond, from the header, before anything is allocated.
+  std::uint64_t max_samples = 50'000'000;
   bool drop_non_finite = false;  ///< drop such samples and count them, instead of kNonFinite
 };
 
@@ -39,8 +39,8 @@ struct ImportReport {
   std::uint64_t duplicate_count = 0;  ///< samples that stand exactly where an earlier one stands; kept
   bool from_mesh = false;             ///< faces were present and left out
   bool position_is_double = false;
-  std::vector<std::string>
-      attributes;                    ///< "normal", "color", "texcoord", then the further properties by name
+  /// "normal", "color", "texcoord", then the further properties by name.
+  std::vector<std::string> attributes;
   std::vector<std::string> skipped;  ///< elements and list properties that were skipped
   Vec3d bounds_min = Vec3d::Zero();  ///< model space
   Vec3d bounds_max = Vec3d::Zero();
@@ -53,9 +53,10 @@ struct ImportedCloud {
 
 /// Reads a cloud and puts it in order: finite check, range check (|x| <= 1e9; extent at least 1e-5 of the
 /// offset), recentring, coherent order, duplicate count. Draco: the bytes are decoded in this process; the
-/// gate of io/draco_gate.h runs first. The daemon calls this inside its confined decoder only. Errors:
-/// kEmptyCloud, kMalformedData (with line or byte offset), kUnsupportedFormat, kNonFinite, kOutOfRange,
-/// kTooLarge Cost:   O(bytes + N log N)
+/// gate of io/draco_gate.h runs first. The daemon calls this inside its confined decoder only.
+/// Errors: kEmptyCloud, kMalformedData (with line or byte offset), kUnsupportedFormat, kNonFinite,
+///         kOutOfRange, kTooLarge
+/// Cost:   O(bytes + N log N)
 Result<ImportedCloud> read_cloud(std::span<const std::byte> bytes, CloudFormat format,
                                  const ImportParams& params);
 
@@ -67,7 +68,8 @@ struct ExportParams {
 
 /// Writes a cloud with all its attributes. PLY: float64 positions where the cloud's were (or where the origin
 /// makes float32 lose bits), original properties, names and types. Draco: sequential, float64 origin in the
-/// metadata. Errors: kInvalidArgument, kEmptyCloud; kUnsupportedFormat for XYZ with params it cannot hold
+/// metadata.
+/// Errors: kInvalidArgument, kEmptyCloud; kUnsupportedFormat for XYZ with params it cannot hold
 Result<std::vector<std::byte>> write_cloud(const Cloud& cloud, CloudFormat format,
                                            const ExportParams& params);
 

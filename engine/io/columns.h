@@ -18,7 +18,8 @@ namespace pointwright {
 /// green blue [alpha] as uint8, s t | u v | texture_u texture_v as float; every other column stays a scalar,
 /// in order. Normals of another length are scaled to unit length; where one has none, all three stay scalars.
 /// The cloud stands in the columns' order at origin 0, as the file has it: nothing is checked for range or
-/// finiteness. Errors: kMalformedData (no x, y or z; a name twice), kEmptyCloud
+/// finiteness.
+/// Errors: kMalformedData (no x, y or z; a name twice), kEmptyCloud
 Result<ImportedCloud> assemble_cloud(std::vector<ScalarAttribute> columns, ImportReport report);
 
 /// How a writer sees a cloud: rows in the order asked for, unclashing names, and the precision that positions

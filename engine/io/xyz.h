@@ -19,8 +19,8 @@ bool looks_like_xyz(std::span<const std::byte> bytes);
 /// line with one whole number is the count of samples (checked); a first line (or comment) with as many words
 /// as there are columns, x, y and z among them, names the columns. Without names: x y z; six columns are x y
 /// z and a unit normal, or x y z and colours of 0..255; further columns become scalars "column_4", …. Numbers
-/// that say no more than a float32 does are kept as float32, all others as float64, column by column. Errors:
-/// kMalformedData (with the line), kTooLarge, kEmptyCloud
+/// that say no more than a float32 does are kept as float32, all others as float64, column by column.
+/// Errors: kMalformedData (with the line), kTooLarge, kEmptyCloud
 Result<ImportedCloud> read_xyz(std::span<const std::byte> bytes, const ImportParams& params);
 
 /// Shortest numbers that read back to the same bits; a comment line with the columns' names where there are

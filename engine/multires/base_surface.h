@@ -30,9 +30,12 @@ struct BaseSurface {
 /// opposite sheets share a cell), at the centroid; then umbrella smoothing along the normals until grid,
 /// umbrella and moving least squares together amount to a Gaussian of standard deviation `scale`. The grid is
 /// what makes a base mean the same on a preview and on the full scan, keeps it even (no samples pile up under
-/// smoothing), and makes the cost independent of the scale. Shapes:      N samples with unit normals,
-/// consistently oriented; M <= 2 N Pre:         scale > 0 Errors:      kInvalidArgument (scale out of reach),
-/// kCancelled Cost:        O(N) sort and O(M k) Determinism: bitwise equal for any thread count
+/// smoothing), and makes the cost independent of the scale.
+/// Shapes:      N samples with unit normals, consistently oriented; M <= 2 N
+/// Pre:         scale > 0
+/// Errors:      kInvalidArgument (scale out of reach), kCancelled
+/// Cost:        O(N) sort and O(M k)
+/// Determinism: bitwise equal for any thread count
 Result<BaseSurface> build_base_surface(const Points& position, const Points& normal, const Vec3d& origin,
                                        float scale, const ExecutionContext& context);
 

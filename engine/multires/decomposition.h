@@ -23,8 +23,8 @@ struct Decomposition {
 };
 
 struct DecomposeParams {
-  float tolerance_spacing =
-      1e-3F;  ///< converged where a step moves less than this times the median sample spacing
+  /// Converged where a step moves less than this times the median sample spacing.
+  float tolerance_spacing = 1e-3F;
   std::uint32_t walk_limit = 30;  ///< Newton steps over the cached graph before the tree takes over
   std::uint32_t tree_limit = 50;  ///< Newton steps with exact neighbours and damping 0.5
   friend bool operator==(const DecomposeParams&, const DecomposeParams&) = default;
@@ -36,7 +36,8 @@ struct DecomposeParams {
 /// damped, so p = r + d n holds by construction. The start is p's own counterpart, not the nearest sample of
 /// Q, which may lie on another sheet. Where no base point is found (limit reached with a residual above 0.05
 /// spacings, a flipped normal, |d| beyond four scales) the plane through the counterpart with its normal
-/// stands in, and is counted. Shapes:      N samples with unit normals; spacing > 0 is their median spacing
+/// stands in, and is counted.
+/// Shapes:      N samples with unit normals; spacing > 0 is their median spacing
 /// Errors:      kCancelled
 /// Cost:        O(N iterations k); about 2.5 iterations a sample
 /// Determinism: bitwise equal for any thread count

@@ -47,9 +47,11 @@ struct Hierarchy {
 
 /// Paper:       §3, §3.4; engine/README.md says where it departs
 /// Shapes:      N >= 1 samples in coherent order; uploaded normals, where the cloud has them, are kept and
-/// orient Errors:      kInvalidArgument, kEmptyCloud, kCancelled Cost:        O(N k log N); about 120 bytes a
-/// sample while it runs Determinism: bitwise equal for any thread count Cancels:     between phases and
-/// between blocks of samples
+///              say which side is out
+/// Errors:      kInvalidArgument, kEmptyCloud, kCancelled
+/// Cost:        O(N k log N); about 120 bytes a sample while it runs
+/// Determinism: bitwise equal for any thread count
+/// Cancels:     between phases and between blocks of samples
 Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& params,
                                   const ExecutionContext& context);
 

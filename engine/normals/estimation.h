@@ -17,10 +17,12 @@ struct NormalParams {
 
 /// Unit normals of all samples, their sides undetermined (see orientation.h). The sample itself counts with
 /// weight 1. Degenerate neighbourhoods (collinear, coincident, fewer than two neighbours) get some unit
-/// vector across their direction; returns how many there are. Paper:       §2.2, Eq. (2)-(4) Shapes:      N
-/// points and their graph; `normal` is resized to N Errors:      none; LogicError for a sigma out of range or
-/// a graph of other points Cost:        O(N k), vectorised over blocks of samples, parallel Determinism:
-/// bitwise equal for any thread count and instruction set
+/// vector across their direction; returns how many there are.
+/// Paper:       §2.2, Eq. (2)-(4)
+/// Shapes:      N points and their graph; `normal` is resized to N
+/// Errors:      none; LogicError for a sigma out of range or a graph of other points
+/// Cost:        O(N k), vectorised over blocks of samples, parallel
+/// Determinism: bitwise equal for any thread count and instruction set
 std::size_t estimate_normals(const Points& points, const NeighborGraph& graph, const NormalParams& params,
                              Points& normal);
 

@@ -13,7 +13,8 @@ struct Symmetric3d {
 /// Unit eigenvector of the smallest eigenvalue of a positive semi-definite matrix, as the dominant
 /// eigenvector of its adjugate by repeated squaring: no branches, no iteration count that depends on the
 /// data. Returns false where the smallest eigenvalue is not single (collinear or coincident points): `vector`
-/// is then some unit vector of the null space. Cost: about 150 flops
+/// is then some unit vector of the null space.
+/// Cost: about 150 flops
 bool smallest_eigenvector(const Symmetric3d& matrix, Vec3d& vector);
 
 /// Accumulates weighted points and fits the plane that minimises Eq. (2). Points are best given relative to a
@@ -38,8 +39,8 @@ class PlaneFit {
   [[nodiscard]] double weight() const { return weight_; }
   [[nodiscard]] Vec3d centroid() const { return Vec3d(x_, y_, z_) / weight_; }
 
-  /// The plane's unit normal, its sign undetermined. False where the points do not span a plane. Pre:
-  /// weight() > 0.
+  /// The plane's unit normal, its sign undetermined. False where the points do not span a plane.
+  /// Pre: weight() > 0
   bool normal(Vec3d& n) const;
 
  private:

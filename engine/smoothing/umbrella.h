@@ -42,9 +42,12 @@ Result<void> validate(const UmbrellaParams& params);
 /// p' = p + lambda * umbrella(p), Eq. (7) and (8), `iterations` times, over the neighbourhoods of the graph.
 /// With local preservation a step is P += u - W^T u, u = lambda * umbrella: a bi-Laplacian flow that keeps
 /// the mean of all positions, gathered over reverse neighbours so that the result never depends on the thread
-/// count. Shapes:      N points, their graph, N unit normals (read only with kAlongNormal) Errors:
-/// kInvalidArgument, kCancelled Cost:        O(iterations N k), parallel over samples Determinism: bitwise
-/// equal for any thread count Cancels:     between iterations
+/// count.
+/// Shapes:      N points, their graph, N unit normals (read only with kAlongNormal)
+/// Errors:      kInvalidArgument, kCancelled
+/// Cost:        O(iterations N k), parallel over samples
+/// Determinism: bitwise equal for any thread count
+/// Cancels:     between iterations
 Result<Points> smooth(const Points& points, const Points& normals, const NeighborGraph& graph,
                       const UmbrellaParams& params, const ExecutionContext* context = nullptr);
 

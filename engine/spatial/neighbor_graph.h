@@ -41,7 +41,8 @@ NeighborGraph build_neighbor_graph(const Points& points, std::uint32_t k,
                                    const ExecutionContext* context = nullptr);
 
 /// Local sample spacing h_i = r_k sqrt(pi / (k + 1/2)), r_k the distance to the k-th neighbour: the square
-/// root of the area per sample on an evenly sampled surface. 0 where a sample has no neighbour. Cost: O(N).
+/// root of the area per sample on an evenly sampled surface. 0 where a sample has no neighbour.
+/// Cost: O(N)
 std::vector<float> local_spacing(const Points& points, const NeighborGraph& graph);
 
 }  // namespace pointwright

@@ -21,7 +21,8 @@ struct HeadLimits {
 /// Parses everything up to and including the empty line. Refused, among others: bare LF or CR, NUL and
 /// control characters, folded lines, spaces before the colon, a missing or repeated Host, Content-Length that
 /// is not one run of digits, any Transfer-Encoding or Content-Encoding, more than one range, methods that owe
-/// a length without one. Errors: a Problem with status 400, 411, 414, 415, 416, 417, 431, 501 or 505
+/// a length without one.
+/// Errors: a Problem with status 400, 411, 414, 415, 416, 417, 431, 501 or 505
 std::variant<RequestHead, Problem> parse_head(std::string_view bytes, const HeadLimits& limits);
 
 /// Percent-decodes; nullopt for a broken escape, NUL or control characters. `plus_is_space` for query

@@ -96,8 +96,8 @@ struct Endpoint {
   std::string route;  ///< the pattern, for logs
   std::vector<std::string> captures;
   std::function<Response(const Request&)> handle;
-  std::shared_ptr<void> hold =
-      {};  ///< what the request keeps from others (memory for its body) until it is answered
+  /// What the request keeps from others (memory for its body) until it is answered.
+  std::shared_ptr<void> hold = {};
 };
 using Resolution = std::variant<Response, Endpoint>;
 

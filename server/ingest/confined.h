@@ -36,9 +36,8 @@ struct ConfineLimits {
 /// Blocks up to queue_seconds + deadline_seconds. Safe from any thread; waits for no child but its own.
 /// A build with a sanitizer bounds the child's time and descriptors only: sanitizers need the rest.
 /// Errors: those of read_cloud(); kTooLarge where memory, time or output ran out; kMalformedData where the
-/// decoder died
-///         of the bytes; kCancelled where the context was cancelled, no slot came free in time, or no process
-///         could be started (field "decoder": the server is to blame, not the file)
+///         decoder died of the bytes; kCancelled where the context was cancelled, no slot came free in time,
+///         or no process could be started (field "decoder": the server is to blame, not the file)
 Result<ImportedCloud> read_confined(std::span<const std::byte> bytes, CloudFormat format,
                                     const ImportParams& params, const ConfineLimits& limits,
                                     const ExecutionContext* context = nullptr);

@@ -19,8 +19,8 @@ Result<std::vector<std::byte>> read_file(const std::string& path,
 
 /// Writes to a new file beside `path`, brings it to the disk, gives it the name, brings the folder to the
 /// disk. Where any of that fails, `path` is as it was and nothing is left behind. The file is readable by its
-/// owner alone. Errors: kTooLarge (no space or quota; field "path"), kInvalidArgument (anything else; field
-/// "path")
+/// owner alone.
+/// Errors: kTooLarge (no space or quota; field "path"), kInvalidArgument (anything else; field "path")
 Result<void> write_file_atomically(const std::string& path, std::span<const std::byte> bytes);
 
 }  // namespace pointwright

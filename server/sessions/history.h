@@ -33,8 +33,9 @@ class History {
   void push(std::shared_ptr<const RecordedEdit> edit, SurfaceState after);
   /// Puts an equal state with more valid levels in place of the current one.
   void replace_current(SurfaceState state);
-  /// Goes to the state after `edit` edits, from the nearest stored state before it. Pre: edit <=
-  /// edits().size(). Errors: those of the replay; the head then stays where it was.
+  /// Goes to the state after `edit` edits, from the nearest stored state before it.
+  /// Pre:    edit <= edits().size()
+  /// Errors: those of the replay; the head then stays where it was
   Result<void> move_head(std::size_t edit);
 
  private:

@@ -19,8 +19,8 @@ class SessionStore {
   SessionStore(const SessionStore&) = delete;
   SessionStore& operator=(const SessionStore&) = delete;
 
-  /// Opens a session on a cloud and starts building it. Problems: not found (the cloud), too many, out of
-  /// space.
+  /// Opens a session on a cloud and starts building it.
+  /// Problems: not found (the cloud), too many, out of space
   Outcome<std::shared_ptr<Session>> create(const CloudStore& clouds,
                                            const protocol::CreateSessionRequest& request);
   [[nodiscard]] std::shared_ptr<Session> find(const std::string& id) const;

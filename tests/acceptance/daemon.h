@@ -27,8 +27,8 @@ class TemporaryFolder {
 
 /// How a process ended, and what it wrote.
 struct Ended {
-  int status =
-      -1;  ///< exit status; 128 + signal where one ended it; -1 where it had to be killed at the deadline
+  /// Exit status; 128 + signal where one ended it; -1 where it had to be killed at the deadline.
+  int status = -1;
   std::string out;
   std::string err;
 };

@@ -10,7 +10,9 @@
 namespace pointwright::bench {
 
 /// N samples of a torus (radii 1 and 0.4) with bumps of three wavelengths, sampled evenly by area with random
-/// positions, in random order. The same bytes on every machine. Pre: n <= 2^32 - 1. Cost: O(N).
+/// positions, in random order. The same bytes on every machine.
+/// Pre:  n <= 2^32 - 1
+/// Cost: O(N)
 Cloud synthetic_scan(std::size_t n, std::uint64_t seed = 1);
 
 /// The scan as an importer leaves it: in coherent order.
