@@ -7,10 +7,6 @@ namespace {
 
 constexpr std::array<float, kPieceLanes> kZeros{};
 
-constexpr std::size_t padded_to_word(std::size_t bytes) {
-  return (bytes + 3) / 4 * 4;
-}
-
 /// Entries of a column that go out as they are.
 template <typename T>
 void copy_strided(std::span<const T> column, const SampleRange& samples, std::byte* out) {
@@ -115,12 +111,20 @@ void BlockWriter::write(const BlockPiece& piece, const BlockRecord& record, std:
   if ((attributes_ & kFrameNormal) != 0) write_normals(piece, next(4));
   if ((attributes_ & kFrameDetail) != 0) write_detail(piece, next(4));
   if ((attributes_ & kFrameColor) != 0) copy_strided(columns_.color, piece.samples, next(4));
+  const auto fill_up = [&](std::size_t bytes_per_lane) {  // the last piece clears what pads its section
+    if (piece.lane + piece.samples.count != record.count) return;
+    const std::size_t bytes = bytes_per_lane * record.count;
+    std::fill(section - (padded_to_word(bytes) - bytes), section, std::byte{0});
+  };
   if ((attributes_ & kFrameMarks) != 0) {
     copy_strided(columns_.marks, piece.samples, next(1));
-    const bool last = piece.lane + piece.samples.count == record.count;
-    if (last) std::fill(section - (padded_to_word(record.count) - record.count), section, std::byte{0});
+    fill_up(1);
   }
   if ((attributes_ & kFrameIds) != 0) copy_strided(columns_.ids, piece.samples, next(4));
+  if ((attributes_ & kFrameRadius) != 0) {
+    copy_strided(columns_.radius, piece.samples, next(2));
+    fill_up(2);
+  }
 }
 
 }  // namespace pointwright::protocol

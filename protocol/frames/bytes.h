@@ -32,6 +32,11 @@ void store(std::byte* out, const T& value) {
   std::memcpy(out, &value, sizeof(T));
 }
 
+/// Bytes up to the next whole word of 4.
+constexpr std::size_t padded_to_word(std::size_t bytes) {
+  return (bytes + 3) / 4 * 4;
+}
+
 /// Leaves new elements uninitialised: a buffer that is about to be written whole need not be cleared first.
 template <typename T>
 struct UninitialisedAllocator : std::allocator<T> {

@@ -1,4 +1,5 @@
 // The decoder. It never trusts a number before it is checked against the bytes that are there.
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -6,10 +7,6 @@
 
 namespace pointwright::protocol {
 namespace {
-
-constexpr std::size_t padded_to_word(std::size_t bytes) {
-  return (bytes + 3) / 4 * 4;
-}
 
 Error malformed(std::size_t offset, const std::string& what) {
   return Error{.code = ErrorCode::kMalformedData,
@@ -38,6 +35,8 @@ Result<void> check_magic(std::span<const std::byte> bytes) {
   if (load<std::uint8_t>(bytes, 12) > 1) return malformed(12, "unknown kind");
   if ((load<std::uint16_t>(bytes, 14) & ~kAllFrameAttributes) != 0)
     return malformed(14, "unknown attribute bits");
+  if (load<std::uint8_t>(bytes, 12) == 1 && (load<std::uint16_t>(bytes, 14) & kFrameRadius) != 0)
+    return malformed(14, "radii in a delta");
   return {};
 }
 
@@ -105,7 +104,15 @@ std::vector<T> take(std::span<const std::byte>& bytes, std::size_t count) {
   return column;
 }
 
-void take_columns(std::span<const std::byte> bytes, std::uint16_t attributes, DecodedBlock& block) {
+/// Moves past what fills `bytes_taken` up to a whole word; whether all of it is zero.
+bool skip_padding(std::span<const std::byte>& bytes, std::size_t bytes_taken) {
+  const auto padding = bytes.first(padded_to_word(bytes_taken) - bytes_taken);
+  bytes = bytes.subspan(padding.size());
+  return std::ranges::all_of(padding, [](std::byte value) { return value == std::byte{0}; });
+}
+
+/// False where padding is not zero.
+bool take_columns(std::span<const std::byte> bytes, std::uint16_t attributes, DecodedBlock& block) {
   const std::size_t count = block.count;
   block.position_t = take<std::array<std::uint16_t, 4>>(bytes, count);
   if ((attributes & kFrameNormal) != 0) block.normal = take<std::array<std::int16_t, 2>>(bytes, count);
@@ -121,18 +128,12 @@ void take_columns(std::span<const std::byte> bytes, std::uint16_t attributes, De
   if ((attributes & kFrameColor) != 0) block.color = take<Rgba>(bytes, count);
   if ((attributes & kFrameMarks) != 0) {
     block.marks = take<std::uint8_t>(bytes, count);
-    bytes = bytes.subspan(padded_to_word(count) - count);
+    if (!skip_padding(bytes, count)) return false;
   }
   if ((attributes & kFrameIds) != 0) block.ids = take<std::uint32_t>(bytes, count);
-}
-
-/// Whether the bytes that fill the marks up to a whole word are all zero.
-bool padding_is_zero(std::span<const std::byte> record, std::uint32_t count, std::uint16_t attributes) {
-  if ((attributes & kFrameMarks) == 0) return true;
-  const std::size_t ids = (attributes & kFrameIds) != 0 ? std::size_t{4} * count : 0;
-  const std::size_t padding = padded_to_word(count) - count;
-  for (const std::byte value : record.first(record.size() - ids).last(padding)) {
-    if (value != std::byte{0}) return false;
+  if ((attributes & kFrameRadius) != 0) {
+    block.radius = take<std::uint16_t>(bytes, count);
+    if (!skip_padding(bytes, 2 * count)) return false;
   }
   return true;
 }
@@ -159,9 +160,12 @@ Result<DecodedBlock> read_block(std::span<const std::byte> bytes, const FrameHea
     block.extent[static_cast<int>(axis)] = extent;
   }
   const auto record = bytes.subspan(offset, record_bytes);
-  if (!padding_is_zero(record, block.count, header.attributes))
+  if (!take_columns(record.subspan(kBlockHeaderBytes), header.attributes, block))
     return malformed(offset, "padding that is not zero");
-  take_columns(record.subspan(kBlockHeaderBytes), header.attributes, block);
+  for (const std::uint16_t radius : block.radius) {
+    if (!finite_and_not_negative(from_bfloat16(radius)))
+      return malformed(offset, "a radius that is not a length");
+  }
   offset += record_bytes;
   return block;
 }

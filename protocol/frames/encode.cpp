@@ -2,6 +2,7 @@
 // straight to its place, by whichever thread takes it.
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <limits>
 
 #include "engine/core/parallel.h"
@@ -13,10 +14,6 @@ namespace {
 
 /// Pieces that one thread takes at a time: four windows of the cloud.
 constexpr std::size_t kPiecesPerTask = std::size_t{4} * kLayerCount;
-
-constexpr std::size_t padded_to_word(std::size_t bytes) {
-  return (bytes + 3) / 4 * 4;
-}
 
 bool has(std::uint16_t attributes, FrameAttribute attribute) {
   return (attributes & attribute) != 0;
@@ -38,6 +35,8 @@ void check_columns(const FrameLayout& layout, const FrameColumns& columns, std::
                     "colours do not fit the layout");
   POINTWRIGHT_CHECK(!has(attributes, kFrameMarks) || columns.marks.size() >= n,
                     "marks do not fit the layout");
+  POINTWRIGHT_CHECK(!has(attributes, kFrameRadius) || columns.radius.size() >= n,
+                    "radii do not fit the layout");
   POINTWRIGHT_CHECK(!has(attributes, kFrameIds) || columns.ids.size() >= n, "ids do not fit the layout");
 }
 
@@ -196,6 +195,7 @@ std::size_t block_record_bytes(std::uint32_t count, std::uint16_t attributes) {
     if (has(attributes, attribute)) bytes += std::size_t{4} * count;
   }
   if (has(attributes, kFrameMarks)) bytes += padded_to_word(count);
+  if (has(attributes, kFrameRadius)) bytes += padded_to_word(std::size_t{2} * count);
   return bytes;
 }
 
@@ -217,7 +217,17 @@ void encode_delta_frame(const FrameLayout& layout, const FrameColumns& columns, 
   for (std::size_t i = 1; i < blocks.size(); ++i) {
     POINTWRIGHT_CHECK(blocks[i - 1] < blocks[i], "the blocks of a delta ascend");
   }
-  encode_frame(FrameKind::kDelta, layout, columns, state, attributes, blocks, out);
+  const auto sent = static_cast<std::uint16_t>(attributes & ~kFrameRadius);
+  encode_frame(FrameKind::kDelta, layout, columns, state, sent, blocks, out);
+}
+
+std::uint16_t to_bfloat16(float value) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  return static_cast<std::uint16_t>((bits + 0x7FFFU + ((bits >> 16) & 1U)) >> 16);
+}
+
+float from_bfloat16(std::uint16_t bits) {
+  return std::bit_cast<float>(std::uint32_t{bits} << 16);
 }
 
 SurfaceBounds surface_bounds(const Points& position) {

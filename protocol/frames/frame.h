@@ -35,8 +35,9 @@ enum FrameAttribute : std::uint16_t {
   kFrameColor = 8,
   kFrameMarks = 16,
   kFrameIds = 32,
+  kFrameRadius = 64,  ///< key frames only: a delta leaves the receiver's radii as they are
 };
-inline constexpr std::uint16_t kAllFrameAttributes = 63;
+inline constexpr std::uint16_t kAllFrameAttributes = 127;
 
 /// A ball around the whole surface, relative to the origin: what a camera frames.
 struct SurfaceBounds {
@@ -71,6 +72,7 @@ struct FrameColumns {
   std::span<const Rgba> color;
   std::span<const std::uint8_t> marks;
   std::span<const std::uint32_t> ids;
+  std::span<const std::uint16_t> radius;  ///< of the splats, as to_bfloat16 gives it
 };
 
 /// What of the header the columns do not say.
@@ -84,6 +86,10 @@ struct FrameState {
   /// Where not given, the bounding box's ball: free in a key, O(N) in a delta.
   std::optional<SurfaceBounds> bounds = std::nullopt;
 };
+
+/// The upper half of a float32, rounded to nearest (ties to even). Pre: finite, and not within 2^-9 of the largest.
+std::uint16_t to_bfloat16(float value);
+float from_bfloat16(std::uint16_t bits);
 
 /// A frame's bytes. Growing one leaves the new bytes uninitialised: the encoder writes every one of them.
 using FrameBytes = std::vector<std::byte, UninitialisedAllocator<std::byte>>;
@@ -134,6 +140,7 @@ struct DecodedBlock {
   std::vector<Rgba> color;
   std::vector<std::uint8_t> marks;
   std::vector<std::uint32_t> ids;
+  std::vector<std::uint16_t> radius;
 };
 
 struct DecodedFrame {

@@ -58,13 +58,14 @@ std::optional<std::string> query_value(const RequestHead& head, std::string_view
 
 Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t allowed,
                                         std::uint16_t fallback) {
-  constexpr std::array<std::pair<std::string_view, std::uint16_t>, 6> kNames = {
+  constexpr std::array<std::pair<std::string_view, std::uint16_t>, 7> kNames = {
       {{"normal", protocol::kFrameNormal},
        {"t", protocol::kFrameT},
        {"detail", protocol::kFrameDetail},
        {"color", protocol::kFrameColor},
        {"marks", protocol::kFrameMarks},
-       {"ids", protocol::kFrameIds}}};
+       {"ids", protocol::kFrameIds},
+       {"radius", protocol::kFrameRadius}}};
   const auto text = query_value(head, "attributes");
   if (!text) return fallback;
   std::uint16_t attributes = 0;
@@ -73,7 +74,7 @@ Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t a
         std::find_if(kNames.begin(), kNames.end(), [&](const auto& n) { return n.first == entry; });
     if (known == kNames.end() || (known->second & allowed) == 0)
       return bad_parameter("attributes",
-                           "only normal, t, detail, color, marks" +
+                           "only normal, t, detail, color, marks, radius" +
                                std::string((allowed & protocol::kFrameIds) != 0 ? ", ids" : "") +
                                " can be asked for");
     attributes = static_cast<std::uint16_t>(attributes | known->second);

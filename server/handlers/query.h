@@ -20,7 +20,7 @@ Outcome<Done> check_query(const RequestHead& head, const std::vector<std::string
 /// The parameter's text, where it was given.
 std::optional<std::string> query_value(const RequestHead& head, std::string_view name);
 
-/// ?attributes=normal,t,detail,color,marks,ids as the bits of a frame. `fallback` where it is not given.
+/// ?attributes=normal,t,detail,color,marks,ids,radius as the bits of a frame. `fallback` where it is not given.
 Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t allowed,
                                         std::uint16_t fallback);
 

@@ -31,6 +31,7 @@ protocol::FrameColumns frame_columns(const Picture& picture, const Cloud& cloud,
   columns.color = cloud.color;
   columns.marks = *picture.marks;
   columns.ids = cloud.id;
+  if (picture.splat_radius != nullptr) columns.radius = *picture.splat_radius;
   return columns;
 }
 

@@ -22,6 +22,7 @@ struct Picture {
   std::shared_ptr<const MultiresSurface> surface;
   std::shared_ptr<const ScaleField> field;  ///< null: t is 0 everywhere
   std::shared_ptr<const Marks> marks;
+  std::shared_ptr<const std::vector<std::uint16_t>> splat_radius;  ///< bfloat16; the same in every picture
   float detail_range = 0.0F;
   std::uint64_t revision = 0;
   std::uint64_t sequence = 0;  ///< of the preview; 0 for the committed state

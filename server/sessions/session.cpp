@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/core/parallel.h"
+#include "engine/spatial/splat_radius.h"
 
 namespace pointwright::server {
 
@@ -85,6 +86,11 @@ void Session::finish_building(Result<Hierarchy> built) {
   if (!built) return fail(protocol::to_problem(built.error()));
   Document document = *this->document();
   Hierarchy hierarchy = std::move(built).value();
+  const Level& rest = hierarchy.surface.finest();
+  auto radius = std::make_shared<std::vector<std::uint16_t>>();
+  for (const float value : splat_radii(rest.position, rest.normal, hierarchy.graph))
+    radius->push_back(protocol::to_bfloat16(value));
+  rest_.splat_radius = std::move(radius);
   rest_.spacing = std::move(hierarchy.spacing);
   median_spacing_ = median_of(rest_.spacing);
   SurfaceState state{
@@ -185,15 +191,21 @@ Outcome<SharedDocument> Session::ready_document() const {
   return now;
 }
 
+Picture Session::picture_of(const SurfaceState& state, SharedField field, std::uint64_t sequence) const {
+  const SharedDocument now = document();
+  return {.surface = state.surface,
+          .field = std::move(field),
+          .marks = now->marks,
+          .splat_radius = rest_.splat_radius,
+          .detail_range = detail_range_of(state),
+          .revision = now->revision,
+          .sequence = sequence};
+}
+
 void Session::show_committed() {
   const SharedDocument now = document();
   shows_preview_ = false;
-  display_.publish({.surface = now->surface.surface,
-                    .field = shown_field_,
-                    .marks = now->marks,
-                    .detail_range = detail_range_of(now->surface),
-                    .revision = now->revision,
-                    .sequence = 0});
+  display_.publish(picture_of(now->surface, shown_field_, 0));
   feed_.notify();
 }
 
@@ -314,14 +326,8 @@ void Session::run_preview() {
   const auto begin = SteadyClock::now();
   const auto after = compute(request->edit);
   if (!after.ok()) return;  // the regions were repainted meanwhile: the next preview is told so
-  const SharedDocument now = document();
   shows_preview_ = true;
-  display_.publish({.surface = after.value().surface,
-                    .field = shown_field_,
-                    .marks = now->marks,
-                    .detail_range = detail_range_of(after.value()),
-                    .revision = now->revision,
-                    .sequence = request->sequence});
+  display_.publish(picture_of(after.value(), shown_field_, request->sequence));
   note_time("preview", begin);
   feed_.notify();
 }
@@ -337,12 +343,7 @@ Outcome<SharedFrame> Session::render_preview(const protocol::PreviewRequest& req
       return protocol::to_problem(valid.error());
     const auto after = compute(request.edit);
     if (!after.ok()) return after.problem();
-    const Picture picture{.surface = after.value().surface,
-                          .field = field_,
-                          .marks = now->marks,
-                          .detail_range = detail_range_of(after.value()),
-                          .revision = now->revision,
-                          .sequence = request.sequence};
+    const Picture picture = picture_of(after.value(), field_, request.sequence);
     const auto finest = static_cast<std::uint32_t>(picture.surface->band_count());
     return encode_picture(display_.layout(), picture, *params_.cloud, finest, attributes);
   });

@@ -163,16 +163,7 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
       if (made.ok()) field = made.value();  // without usable regions t is 0 everywhere
       show_field();
     }
-    const SharedDocument now = document();
-    float range = 0.0F;
-    for (const DecompositionReport& report : *now->surface.reports)
-      range = std::max(range, report.max_detail);
-    return Picture{.surface = now->surface.surface,
-                   .field = std::move(field),
-                   .marks = now->marks,
-                   .detail_range = range,
-                   .revision = now->revision,
-                   .sequence = 0};
+    return picture_of(document()->surface, std::move(field), 0);
   });
 }
 

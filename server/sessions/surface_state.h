@@ -25,6 +25,7 @@ struct RestModel {
   HierarchyParams params;
   float diagonal = 0.0F;  ///< of the rest cloud: what the scales are fractions of
   std::vector<float> spacing;
+  std::shared_ptr<const std::vector<std::uint16_t>> splat_radius;  ///< for viewers: bfloat16, by sample
   HierarchyBuilder build;
 };
 

@@ -78,6 +78,7 @@ TEST_CASE("a key frame gives back every sample within half a quantisation step")
           REQUIRE(block.color[lane] == columns.color[i]);
           REQUIRE(block.marks[lane] == columns.marks[i]);
           REQUIRE(block.ids[lane] == columns.ids[i]);
+          REQUIRE(block.radius[lane] == columns.radius[i]);
           REQUIRE(std::abs(static_cast<float>(block.position_t[lane][3]) / 65535.0F - columns.t[i]) <=
                   0.51F / 65535.0F);
           const float detail = static_cast<float>(block.detail[lane]) / 32767.0F;
@@ -291,7 +292,7 @@ TEST_CASE("encoders refuse what would make a bad frame") {
   for (const auto& blocks : {descending, repeated, beyond}) {
     CHECK_THROWS_AS(encode_delta_frame(layout, columns.view(), {}, 0, blocks, bytes), LogicError);
   }
-  CHECK_THROWS_AS(encode_key_frame(layout, columns.view(), {}, 64, bytes), LogicError);
+  CHECK_THROWS_AS(encode_key_frame(layout, columns.view(), {}, 128, bytes), LogicError);
   CHECK_THROWS_AS(encode_key_frame(layout, columns.view(), {.sequence = kMaxSequence + 1}, 0, bytes),
                   LogicError);
   CHECK(key_frame_bytes(layout, kEverything) == key_of(columns, 32).size());

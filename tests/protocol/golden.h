@@ -24,6 +24,7 @@ struct Columns {
   std::vector<Rgba> color;
   std::vector<std::uint8_t> marks;
   std::vector<std::uint32_t> ids;
+  std::vector<std::uint16_t> radius;
 
   [[nodiscard]] FrameColumns view() const;
 };

@@ -76,6 +76,7 @@ JsonDocument block_document(const FrameHeader& header, const DecodedBlock& block
                       {"color", flat_array_of(block.color)},
                       {"marks", array_of(block.marks)},
                       {"ids", array_of(block.ids)},
+                      {"radius", array_of(block.radius)},
                       {"positions", std::move(positions)},
                       {"normals", std::move(normals)}};
 }
@@ -183,9 +184,9 @@ JsonDocument malformed_frames() {
   patch("another header size", "key.frame", 6, std::string("\x64\x00", 2));
   patch("a length that is not its own", "key.frame", 8, std::string("\x60\x00\x00\x00", 4));
   patch("unknown kind", "key.frame", 12, "\x02");
-  patch("unknown attribute", "key.frame", 14, std::string("\x7f\x00", 2));
+  patch("unknown attribute", "key.frame", 14, std::string("\xff\x00", 2));
   patch("attributes that make records longer", "single.frame", 14, std::string("\x01\x00", 2));
-  patch("attributes that make records shorter", "key.frame", 14, std::string("\x3e\x00", 2));
+  patch("attributes that make records shorter", "key.frame", 14, std::string("\x7e\x00", 2));
   patch("a revision beyond 2^53", "key.frame", 16, "\xff\xff\xff\xff\xff\xff\xff\xff");
   patch("a sequence beyond 2^53", "key.frame", 24, std::string("\x00\x00\x00\x00\x00\x00\x20\x00", 8));
   patch("samples beyond the limit", "key.frame", 32, "\xff\xff\xff\xff");
@@ -214,9 +215,13 @@ JsonDocument malformed_frames() {
   patch("an infinite extent", "key.frame", 120, little_endian(infinity, 4));
   patch("a box that overflows", "single.frame", 104,
         little_endian(3e38, 4) + std::string(8, '\0') + little_endian(3e38, 4));
-  // Block 0 has 3 samples: its marks end with one byte of padding, before 3 ids.
-  const std::size_t padding = 96 + block_record_bytes(3, kAllFrameAttributes) - 12 - 1;
-  patch("padding that is not zero", "key.frame", padding, "\x01");
+  patch("radii in a delta", "delta.frame", 14, std::string("\x43\x00", 2));
+  // Block 0 has 3 samples: 3 marks and a byte of padding, 3 ids, 3 radii and two bytes of padding.
+  const std::size_t end = 96 + block_record_bytes(3, kAllFrameAttributes);
+  patch("padding of marks that is not zero", "key.frame", end - 8 - 12 - 1, "\x01");
+  patch("padding of radii that is not zero", "key.frame", end - 1, "\x01");
+  patch("a radius that is not finite", "key.frame", end - 8, "\x80\x7f");
+  patch("a radius below zero", "key.frame", end - 8, "\x80\xbf");
   return list;
 }
 
@@ -230,7 +235,8 @@ Columns::Columns(std::uint32_t count)
       stretch(count),
       color(count),
       marks(count),
-      ids(count) {
+      ids(count),
+      radius(count) {
   std::uint32_t random = 12345;
   const auto next = [&random](std::uint32_t range) {
     random = random * 1664525U + 1013904223U;
@@ -251,6 +257,7 @@ Columns::Columns(std::uint32_t count)
                 static_cast<std::uint8_t>(next(256)), 255};
     marks[i] = static_cast<std::uint8_t>(next(4));
     ids[i] = count - 1 - i;
+    radius[i] = to_bfloat16(static_cast<float>(i) / 64.0F);
   }
 }
 
@@ -262,7 +269,8 @@ FrameColumns Columns::view() const {
           .stretch = stretch,
           .color = color,
           .marks = marks,
-          .ids = ids};
+          .ids = ids,
+          .radius = radius};
 }
 
 std::vector<File> vector_files() {

@@ -34,17 +34,25 @@ export function viewerStatus(page) {
   return page.evaluate(() => globalThis.pointwright?.status ?? null);
 }
 
+/** Waits until the viewer shows its session whole, though not yet in its final quality. */
+export function waitForReady(page, timeoutMs = 300_000) {
+  return waitForStatus(page, "ready", (status) => status.state === "ready", 1, timeoutMs);
+}
+
 /** Waits until the viewer shows its session whole and has nothing left to draw. */
-export async function waitForIdle(page, timeoutMs = 300_000) {
+export function waitForIdle(page, timeoutMs = 300_000) {
+  return waitForStatus(page, "idle", (status) => status.idle && status.state === "ready", 2, timeoutMs);
+}
+
+async function waitForStatus(page, name, holds, times, timeoutMs) {
   const ends = Date.now() + timeoutMs;
-  let calm = 0;
-  while (calm < 2) {
+  for (let seen = 0; seen < times; ) {
     const status = await viewerStatus(page);
     if (status?.state === "failed")
       throw new Error("the viewer failed: the session or its picture could not be opened");
-    calm = status?.idle && status.state === "ready" ? calm + 1 : 0;
+    seen = status && holds(status) ? seen + 1 : 0;
     if (Date.now() > ends)
-      throw new Error(`the viewer is not idle after ${timeoutMs} ms: ${JSON.stringify(status)}`);
-    await new Promise((resolve) => setTimeout(resolve, 120));
+      throw new Error(`the viewer is not ${name} after ${timeoutMs} ms: ${JSON.stringify(status)}`);
+    if (seen < times) await new Promise((resolve) => setTimeout(resolve, 120));
   }
 }

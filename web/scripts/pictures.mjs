@@ -6,7 +6,7 @@
 import { mkdirSync } from "node:fs";
 import { dirname, resolve } from "node:path";
 import { parseArgs } from "node:util";
-import { launchBrowser, waitForIdle } from "./browser.mjs";
+import { launchBrowser, waitForIdle, waitForReady } from "./browser.mjs";
 
 const MODES = ["shaded", "regions", "color", "normals", "t", "detail"];
 
@@ -60,13 +60,13 @@ try {
   );
   address.hash = `mode=${options.mode}`;
   await page.goto(address.href);
-  await waitForIdle(page);
   if (options.camera) {
+    await waitForReady(page);
     await page.evaluate((camera) => {
       globalThis.pointwright.camera = camera;
     }, options.camera);
-    await waitForIdle(page);
   }
+  await waitForIdle(page);
   const out = resolve(options.out);
   mkdirSync(dirname(out), { recursive: true });
   await page.screenshot({ path: out, timeout: 300_000 });

@@ -91,6 +91,7 @@ export class FrameSource implements StreamSink {
         hasDetail: hasAttribute(header, "detail"),
         hasColor: hasAttribute(header, "color"),
         hasMarks: hasAttribute(header, "marks"),
+        hasRadius: hasAttribute(header, "radius"),
       },
       key,
     );
@@ -112,6 +113,7 @@ export class FrameSource implements StreamSink {
       detail: block.detailStretch,
       color: block.color,
       marks: block.marks,
+      radius: block.radius,
     });
     if (header.kind === "key" && performance.now() - this.told_ > TELL_MS) this.tellLoad(header, false);
   }

@@ -14,7 +14,7 @@ import type {
 
 export type Fetch = (input: string, init?: RequestInit) => Promise<Response>;
 
-export const STREAM_ATTRIBUTES = "normal,t,detail,color,marks";
+export const STREAM_ATTRIBUTES = "normal,t,detail,color,marks,radius";
 
 /** Seconds as `Retry-After` gives them; undefined where it gives none. */
 function retryAfter(response: Response): number | undefined {

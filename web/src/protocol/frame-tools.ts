@@ -51,6 +51,11 @@ export function laneStretch(header: FrameHeader, block: FrameBlock, lane: number
   return ((block.detailStretch?.[2 * lane + 1] ?? 0) / 65535) * header.stretchRange;
 }
 
+/** Radius of a lane's splat in model units; 0 where the frame has none. */
+export function laneRadius(block: FrameBlock, lane: number): number {
+  return new Float32Array(new Uint32Array([(block.radius?.[lane] ?? 0) << 16]).buffer)[0] ?? 0;
+}
+
 /** The bytes of a frame. The columns are taken as they are: nothing is checked, so that tests can make bad frames. */
 export function encodeFrame(frame: Frame): Uint8Array<ArrayBuffer> {
   const { header, blocks } = frame;
@@ -113,6 +118,7 @@ function writeBlock(
   if (attributes & frameAttributes.color) put(block.color, 4 * block.count);
   if (attributes & frameAttributes.marks) put(block.marks, (block.count + 3) & ~3);
   if (attributes & frameAttributes.ids) put(block.ids, 4 * block.count);
+  if (attributes & frameAttributes.radius) put(block.radius, (2 * block.count + 3) & ~3);
 }
 
 /** The bytes of one stream record. */

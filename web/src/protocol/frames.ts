@@ -9,9 +9,9 @@ export const blockHeaderBytes = 32;
 export const maxBlockSize = 65536;
 
 /** Bits of a frame's attributes; positions are always there. */
-export const frameAttributes = { normal: 1, t: 2, detail: 4, color: 8, marks: 16, ids: 32 } as const;
+export const frameAttributes = { normal: 1, t: 2, detail: 4, color: 8, marks: 16, ids: 32, radius: 64 } as const;
 export type FrameAttribute = keyof typeof frameAttributes;
-const allAttributes = 63;
+const allAttributes = 127;
 
 export type FrameKind = "key" | "delta";
 
@@ -51,6 +51,8 @@ export interface FrameBlock {
   /** 1 zero-region, 2 one-region. */
   marks: Uint8Array | null;
   ids: Uint32Array | null;
+  /** Of the splats at rest, as bfloat16; in key frames only. */
+  radius: Uint16Array | null;
 }
 
 export interface Frame {
@@ -81,6 +83,7 @@ export function blockRecordBytes(count: number, attributes: number): number {
     if (attributes & frameAttributes[name]) bytes += 4 * count;
   }
   if (attributes & frameAttributes.marks) bytes += paddedToWord(count);
+  if (attributes & frameAttributes.radius) bytes += paddedToWord(2 * count);
   return bytes;
 }
 
@@ -143,6 +146,7 @@ export function readHeader(view: DataView): FrameHeader {
   refuse(kind > 1, "an unknown kind");
   const attributes = view.getUint16(14, true);
   refuse((attributes & ~allAttributes) !== 0, "unknown attribute bits");
+  refuse(kind === 1 && (attributes & frameAttributes.radius) !== 0, "radii in a delta");
   return {
     kind: kind === 0 ? "key" : "delta",
     level: view.getUint8(13),
@@ -224,12 +228,20 @@ export function readBlock(
   const normal = has("normal") ? new Int16Array(buffer, take(4 * count), 2 * count) : null;
   const detailStretch = has("detail") ? new Uint16Array(buffer, take(4 * count), 2 * count) : null;
   const color = has("color") ? new Uint8Array(buffer, take(4 * count), 4 * count) : null;
-  const marks = has("marks") ? new Uint8Array(buffer, take(count), count) : null;
-  if (marks) {
-    const padding = paddedToWord(count) - count;
+  const skipPadding = (bytesTaken: number): void => {
+    const padding = paddedToWord(bytesTaken) - bytesTaken;
     const zero = new Uint8Array(buffer, take(padding), padding).every((value) => value === 0);
     refuse(!zero, "padding that is not zero");
-  }
+  };
+  const marks = has("marks") ? new Uint8Array(buffer, take(count), count) : null;
+  if (marks) skipPadding(count);
   const ids = has("ids") ? new Uint32Array(buffer, take(4 * count), count) : null;
-  return { number, count, minimum, extent, positionT, normal, detailStretch, color, marks, ids };
+  const radius = has("radius") ? new Uint16Array(buffer, take(2 * count), count) : null;
+  if (radius) {
+    skipPadding(2 * count);
+    // From 0x7f80 on: infinities, what is not a number, and everything with a sign. -0 alone is a length.
+    const sound = radius.every((bits) => bits < 0x7f80 || bits === 0x8000);
+    refuse(!sound, "a radius that is not a length");
+  }
+  return { number, count, minimum, extent, positionT, normal, detailStretch, color, marks, ids, radius };
 }

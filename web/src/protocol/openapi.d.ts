@@ -787,9 +787,9 @@ export interface components {
         Region: "zero" | "one";
         IfNoneMatch: string;
         /** @description What a frame carries beside the positions, as far as the cloud has it */
-        Attributes: ("normal" | "t" | "detail" | "color" | "marks" | "ids")[];
+        Attributes: ("normal" | "t" | "detail" | "color" | "marks" | "ids" | "radius")[];
         /** @description What the frames carry beside the positions, as far as the cloud has it */
-        StreamAttributes: ("normal" | "t" | "detail" | "color" | "marks")[];
+        StreamAttributes: ("normal" | "t" | "detail" | "color" | "marks" | "radius")[];
     };
     requestBodies: never;
     headers: {

@@ -25,7 +25,7 @@ export interface PacerStep {
 
 const REFINEMENTS = 16;
 const LEAST_REFINEMENTS = 4;
-const LEAST_PATIENT_REFINEMENTS = 10;
+const LEAST_PATIENT_REFINEMENTS = 7;
 const REFINEMENT_MS = 1200;
 const REST_MS = 110;
 const LEAST_BUDGET = 30_000;

@@ -20,6 +20,7 @@ export interface SurfaceLayout {
   hasDetail: boolean;
   hasColor: boolean;
   hasMarks: boolean;
+  hasRadius: boolean;
 }
 
 /** One block as the frame carries it: the arrays are uploaded as they are. */
@@ -33,9 +34,10 @@ export interface SurfaceBlock {
   detail: ArrayBufferView | null;
   color: ArrayBufferView | null;
   marks: ArrayBufferView | null;
+  radius: ArrayBufferView | null;
 }
 
-type Field = "positions" | "normals" | "detail" | "color" | "marks";
+type Field = "positions" | "normals" | "detail" | "color" | "marks" | "radius";
 
 interface FieldFormat {
   attribute: string;
@@ -51,6 +53,7 @@ const FORMATS: Record<Field, FieldFormat> = {
   detail: { attribute: "detail", components: 2, bytes: 4, type: "SHORT", normalised: true },
   color: { attribute: "color", components: 4, bytes: 4, type: "UNSIGNED_BYTE", normalised: true },
   marks: { attribute: "mark", components: 1, bytes: 1, type: "UNSIGNED_BYTE", normalised: false },
+  radius: { attribute: "radius", components: 1, bytes: 2, type: "UNSIGNED_SHORT", normalised: false },
 };
 
 const BLOCKS_PER_ROW = 256;
@@ -87,6 +90,7 @@ export class SampleSurface {
     if (layout.hasDetail) this.allocate("detail");
     if (layout.hasColor) this.allocate("color");
     if (layout.hasMarks) this.allocate("marks");
+    if (layout.hasRadius) this.allocate("radius");
   }
 
   get blockTableWidth(): number {
@@ -110,6 +114,7 @@ export class SampleSurface {
     this.upload("detail", slot, block.detail);
     this.upload("color", slot, block.color);
     this.upload("marks", slot, block.marks);
+    this.upload("radius", slot, block.radius);
     const at = block.index * 8;
     this.loadedSamples += block.count - (this.table_[at + 3] ?? 0);
     for (let axis = 0; axis < 3; ++axis) {

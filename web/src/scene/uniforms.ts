@@ -54,6 +54,7 @@ export function createUniforms(viewport: Vector2, textures: PassTextures): PassU
     blockTableWidth: { value: 512 },
     stretchRange: { value: 0 },
     splatRadius: { value: 1 },
+    splatScale: { value: 1 },
     pixelScale: { value: 1 },
     maxPointSize: { value: 64 },
     viewport: { value: viewport },

@@ -15,7 +15,7 @@ import { setResidual, setUniform, vectorUniform } from "./uniforms";
 /** Pixels that the targets hold at most; beyond, the picture is drawn at a lower ratio and scaled up. */
 const MAX_PIXELS = 8_500_000;
 
-/** Splat radius in spacings (the root of the area that a sample stands for): closes scans that are not quite even. */
+/** Splat radius in spacings (the root of the area that a sample stands for), where frames bring no radii. */
 const SPLAT_SPACINGS = 1.45;
 
 export interface BrushRing {
@@ -263,11 +263,9 @@ export class Viewport {
     // Fewer samples stand wider apart: their discs grow so that the surface stays closed.
     const shown = surface ? Math.max(1, Math.min(prefix.samples, Math.max(surface.loadedSamples, 1))) : 1;
     const sparse = Math.sqrt(Math.max(1, this.fullSamples_) / shown);
-    setUniform(
-      splat,
-      "splatRadius",
-      this.spacing_ * SPLAT_SPACINGS * Math.max(1, sparse) * this.display_.splatSize,
-    );
+    const scale = Math.max(1, sparse) * this.display_.splatSize;
+    setUniform(splat, "splatScale", scale);
+    setUniform(splat, "splatRadius", this.spacing_ * SPLAT_SPACINGS * scale);
     setUniform(shade, "turn", index * 0.61);
     camera.setViewOffset(width, height, jitter[0], jitter[1], width, height);
     setUniform(splat, "pixelScale", height * 0.5 * camera.projectionMatrix.elements[5]);

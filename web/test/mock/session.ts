@@ -223,6 +223,7 @@ export class MockSession {
       color: null,
       marks: new Uint8Array(count),
       ids: null,
+      radius: null,
     };
     points.forEach((p, lane) => {
       const i = this.order_[from + lane] ?? 0;

@@ -4,6 +4,7 @@ import {
   laneDetail,
   laneNormal,
   lanePosition,
+  laneRadius,
   laneStretch,
   laneT,
 } from "../../src/protocol/frame-tools";
@@ -17,13 +18,14 @@ import {
 import { goldenBytes, goldenJson } from "./golden";
 
 interface ExpectedBlock
-  extends Omit<FrameBlock, "positionT" | "normal" | "detailStretch" | "color" | "marks" | "ids"> {
+  extends Omit<FrameBlock, "positionT" | "normal" | "detailStretch" | "color" | "marks" | "ids" | "radius"> {
   positionT: number[];
   normal: number[];
   detailStretch: number[];
   color: number[];
   marks: number[];
   ids: number[];
+  radius: number[];
   /** Model space, 3 per sample, as C++ decodes them. */
   positions: number[];
   normals: number[];
@@ -62,7 +64,7 @@ describe.each(vectors)("the golden frame $file", ({ file, header, blocks }) => {
       expect(block.count).toBe(expected.count);
       expect(block.minimum).toEqual(expected.minimum);
       expect(block.extent).toEqual(expected.extent);
-      for (const column of ["positionT", "normal", "detailStretch", "color", "marks", "ids"] as const) {
+      for (const column of ["positionT", "normal", "detailStretch", "color", "marks", "ids", "radius"] as const) {
         expect(Array.from(block[column] ?? [])).toEqual(expected[column]);
       }
     });
@@ -83,6 +85,7 @@ describe.each(vectors)("the golden frame $file", ({ file, header, blocks }) => {
         expect(laneT(block, lane)).toBeGreaterThanOrEqual(0);
         expect(laneT(block, lane)).toBeLessThanOrEqual(1);
         expect(Math.abs(laneDetail(frame.header, block, lane))).toBeLessThanOrEqual(frame.header.detailRange);
+        expect(laneRadius(block, lane)).toBeGreaterThanOrEqual(0);
         expect(laneStretch(frame.header, block, lane)).toBeLessThanOrEqual(frame.header.stretchRange);
       }
     });
@@ -107,6 +110,7 @@ describe("the decoder", () => {
         block.color,
         block.marks,
         block.ids,
+        block.radius,
       ]) {
         expect(view?.buffer).toBe(key.buffer);
       }
@@ -174,6 +178,7 @@ describe("the decoder", () => {
   it("knows the size of records", () => {
     expect(blockRecordBytes(1, 0)).toBe(40);
     expect(blockRecordBytes(3, 16)).toBe(32 + 24 + 4);
+    expect(blockRecordBytes(3, 64)).toBe(32 + 24 + 8);
     expect(blockRecordBytes(5, 63)).toBe(32 + 5 * 8 + 4 * 5 * 4 + 8);
   });
 });

@@ -10,6 +10,7 @@ in vec2 octahedral;
 in vec2 detail;     // snorm detail; stretch as snorm bits
 in vec4 color;
 in float mark;
+in float radius;    // bfloat16 bits; 0 where the frame has none
 
 uniform sampler2D blockTable; // two texels a block: minimum and count, extent
 uniform int blockSize;
@@ -17,7 +18,8 @@ uniform int blockTableWidth;
 uniform float stretchRange;
 uniform mat4 viewMatrix;
 uniform mat4 projectionMatrix;
-uniform float splatRadius;    // world units
+uniform float splatRadius;    // world units, for samples that bring no radius of their own
+uniform float splatScale;     // of the radii that samples bring
 uniform float pixelScale;     // pixels that one world unit spans at depth 1
 uniform float maxPointSize;
 
@@ -79,7 +81,8 @@ bool placeSplat(out vec3 normal) {
   float stretch = stretchRange > 0.0 ? clamp(decodeStretch(detail.y), 1.0, 4.0) : 1.0;
   vCenter = center.xyz;
   vNormal = n;
-  vRadius = splatRadius * stretch;
+  float own = uintBitsToFloat(uint(radius) << 16) * splatScale;
+  vRadius = (own > 0.0 ? own : splatRadius) * stretch;
   gl_Position = projectionMatrix * center;
   gl_PointSize = clamp(2.0 * vRadius * pixelScale / max(-center.z, 1e-20) + 1.0, 1.5, maxPointSize);
   return true;
