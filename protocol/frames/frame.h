@@ -87,7 +87,8 @@ struct FrameState {
   std::optional<SurfaceBounds> bounds = std::nullopt;
 };
 
-/// The upper half of a float32, rounded to nearest (ties to even). Pre: finite, and not within 2^-9 of the largest.
+/// The upper half of a float32, rounded to nearest (ties to even).
+/// Pre: finite, and not so large that it rounds to infinity
 std::uint16_t to_bfloat16(float value);
 float from_bfloat16(std::uint16_t bits);
 

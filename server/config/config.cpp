@@ -36,14 +36,17 @@ struct Assignment {
 };
 
 std::vector<Assignment> environment_assignments(const std::vector<Setting>& settings,
-                                                const Environment& environment,
-                                                const EnvironmentNames& names) {
+                                                const Environment& environment, const EnvironmentNames& names,
+                                                std::vector<std::string>& unknown) {
   std::vector<Assignment> assignments;
   for (const std::string& name : names) {
     if (name == "POINTWRIGHT_CONFIG") continue;
     const auto setting = std::find_if(settings.begin(), settings.end(),
                                       [&](const Setting& s) { return variable_name(s.key) == name; });
-    if (setting == settings.end()) throw std::invalid_argument("unknown environment variable " + name);
+    if (setting == settings.end()) {
+      unknown.push_back(name);
+      continue;
+    }
     std::string text = environment(name).value_or("");
     std::vector<std::string> values;
     if (setting->is_list) {
@@ -115,7 +118,8 @@ ConfigOutcome read_config(const std::vector<std::string>& arguments, const Envir
     Config config;
     if (config_path.empty()) config_path = environment("POINTWRIGHT_CONFIG").value_or("");
     if (!config_path.empty()) apply_file(config_path, settings, config);
-    apply_assignments(environment_assignments(settings, environment, names), config);
+    apply_assignments(environment_assignments(settings, environment, names, config.unknown_variables),
+                      config);
     std::vector<Assignment> from_arguments;
     for (std::size_t i = 0; i < settings.size(); ++i)
       if (!given[i].empty()) from_arguments.push_back({&settings[i], given[i], option_name(settings[i].key)});

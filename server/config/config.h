@@ -31,12 +31,14 @@ struct Config {
   std::string log_file;            ///< empty: standard error
   std::uint32_t threads = 0;       ///< for computing; 0: all of the machine's
   Limits limits;
+  /// Variables with our prefix that set nothing: warned of, since an environment is shared with others' names.
+  std::vector<std::string> unknown_variables;
   friend bool operator==(const Config&, const Config&) = default;
 };
 
 /// Looks an environment variable up; std::getenv in the daemon, a map in tests.
 using Environment = std::function<std::optional<std::string>(const std::string&)>;
-/// The names of all variables that start with POINTWRIGHT_, so that a misspelled one is an error.
+/// The names of all variables that start with POINTWRIGHT_, so that a misspelled one is noticed.
 using EnvironmentNames = std::vector<std::string>;
 
 /// What reading the settings came to: settings; or the text to print and the exit status (help, version,
@@ -47,7 +49,8 @@ struct ConfigExit {
 };
 using ConfigOutcome = std::variant<Config, ConfigExit>;
 
-/// Reads all sources. Unknown options, variables and keys, wrong types and values out of range are errors.
+/// Reads all sources. Unknown options and keys, wrong types and values out of range are errors; unknown
+/// variables are kept for a warning.
 /// `--print-config` ends with the settings as a file that can be read back.
 ConfigOutcome read_config(const std::vector<std::string>& arguments, const Environment& environment,
                           const EnvironmentNames& names);

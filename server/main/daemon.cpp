@@ -88,6 +88,8 @@ int run_daemon(const Config& config) {
   };
   try {
     Log log(config.log_level, config.log_file);
+    for (const std::string& name : config.unknown_variables)
+      log.write(LogLevel::kWarn, "unknown-variable", {{"name", name}});
     raise_descriptor_limit(config, log);
     Service service(config,
                     {.decode = confined_decoder(config.limits),

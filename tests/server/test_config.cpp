@@ -101,9 +101,11 @@ TEST_CASE("samples and allowed hosts can be given several times") {
   CHECK(good(read({}, {{"POINTWRIGHT_ALLOWED_HOSTS", "a.org,b.org"}})).allowed_hosts.size() == 2);
 }
 
-TEST_CASE("unknown options, variables and keys are errors") {
+TEST_CASE("unknown options and keys are errors, unknown variables are kept for a warning") {
   CHECK(refusal(read({"--prot", "1"})).find("--prot") != std::string::npos);
-  CHECK(refusal(read({}, {{"POINTWRIGHT_PROT", "1"}})).find("POINTWRIGHT_PROT") != std::string::npos);
+  const Config config = good(read({}, {{"POINTWRIGHT_PROT", "1"}, {"POINTWRIGHT_PORT", "8"}}));
+  CHECK(config.unknown_variables == std::vector<std::string>{"POINTWRIGHT_PROT"});
+  CHECK(config.port == 8);
   const TemporaryFile top("prot = 1\n");
   CHECK(refusal(read({"--config", top.path()})).find("prot") != std::string::npos);
   const TemporaryFile below("[limits]\nmax_dragons = 1\n");

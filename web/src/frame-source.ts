@@ -58,6 +58,7 @@ export class FrameSource implements StreamSink {
   /** Begins anew with a key frame, as after a lost context. */
   restart(): void {
     this.viewport_.clearSurface();
+    if (this.last) this.tellLoad(this.last, false);
     if (this.level_ === null) this.stream_.start();
     else void this.loadLevel(this.level_);
   }
@@ -67,6 +68,7 @@ export class FrameSource implements StreamSink {
     if (level === this.level_) return;
     this.level_ = level;
     this.abort_.abort();
+    if (this.last) this.tellLoad(this.last, false);
     if (level === null) {
       this.stream_.start();
     } else {

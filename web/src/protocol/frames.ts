@@ -9,7 +9,15 @@ export const blockHeaderBytes = 32;
 export const maxBlockSize = 65536;
 
 /** Bits of a frame's attributes; positions are always there. */
-export const frameAttributes = { normal: 1, t: 2, detail: 4, color: 8, marks: 16, ids: 32, radius: 64 } as const;
+export const frameAttributes = {
+  normal: 1,
+  t: 2,
+  detail: 4,
+  color: 8,
+  marks: 16,
+  ids: 32,
+  radius: 64,
+} as const;
 export type FrameAttribute = keyof typeof frameAttributes;
 const allAttributes = 127;
 

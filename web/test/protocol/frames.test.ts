@@ -64,7 +64,15 @@ describe.each(vectors)("the golden frame $file", ({ file, header, blocks }) => {
       expect(block.count).toBe(expected.count);
       expect(block.minimum).toEqual(expected.minimum);
       expect(block.extent).toEqual(expected.extent);
-      for (const column of ["positionT", "normal", "detailStretch", "color", "marks", "ids", "radius"] as const) {
+      for (const column of [
+        "positionT",
+        "normal",
+        "detailStretch",
+        "color",
+        "marks",
+        "ids",
+        "radius",
+      ] as const) {
         expect(Array.from(block[column] ?? [])).toEqual(expected[column]);
       }
     });
