@@ -9,7 +9,7 @@
 namespace pointwright {
 
 std::size_t estimate_normals(const Points& points, const NeighborGraph& graph, const NormalParams& params,
-                             Points& normal) {
+                             Points& normal, const ExecutionContext* context) {
   POINTWRIGHT_CHECK(graph.count == points.size(), "the graph must be of these points");
   POINTWRIGHT_CHECK(params.sigma > 0.0F && params.sigma <= 100.0F, "sigma must lie in (0, 100]");
   normal.resize(points.size());
@@ -25,8 +25,9 @@ std::size_t estimate_normals(const Points& points, const NeighborGraph& graph, c
                               .normal_z = normal.z()};
   const auto kernel = POINTWRIGHT_KERNEL(estimate_normals_kernel);
   std::atomic<std::size_t> degenerate{0};  // whole numbers: the order of additions does not matter
-  parallel_for(points.size(),
-               [&](std::size_t begin, std::size_t end) { degenerate += kernel(args, begin, end); });
+  parallel_for(
+      points.size(), [&](std::size_t begin, std::size_t end) { degenerate += kernel(args, begin, end); },
+      kParallelBlock, context);
   return degenerate;
 }
 

@@ -23,7 +23,8 @@ struct NormalParams {
 /// Errors:      none; LogicError for a sigma out of range or a graph of other points
 /// Cost:        O(N k), vectorised over blocks of samples, parallel
 /// Determinism: bitwise equal for any thread count and instruction set
+/// Cancels:     between blocks of samples; the normals are then incomplete and must be dropped
 std::size_t estimate_normals(const Points& points, const NeighborGraph& graph, const NormalParams& params,
-                             Points& normal);
+                             Points& normal, const ExecutionContext* context = nullptr);
 
 }  // namespace pointwright

@@ -17,6 +17,12 @@ namespace {
 
 constexpr std::size_t kSmallComponent = 50;
 constexpr std::uint32_t kWeightLevels = 1U << 16;
+constexpr std::size_t kCancelInterval = std::size_t{1} << 16;  // edges or samples of a sequential loop
+
+// Whether a sequential loop that is at `step` should end.
+bool is_cancelled_at(std::size_t step, const ExecutionContext* context) {
+  return context != nullptr && step % kCancelInterval == 0 && context->is_cancelled();
+}
 
 struct Edge {
   std::uint32_t a;
@@ -79,8 +85,10 @@ class SidedSets {
   std::vector<std::uint8_t> opposed_;
 };
 
-// Every undirected edge of the graph once, ordered by weight, then by (a, j): one stable counting sort.
-std::vector<Edge> sorted_edges(const Points& points, const Points& normals, const NeighborGraph& graph) {
+// Every undirected edge of the graph once, ordered by weight, then by (a, j): one stable counting sort. None
+// when cancelled.
+std::vector<Edge> sorted_edges(const Points& points, const Points& normals, const NeighborGraph& graph,
+                               const ExecutionContext* context) {
   const auto n = static_cast<std::uint32_t>(graph.count);
   std::vector<std::uint32_t> first(n + 1, 0);
   const auto is_listed = [&](std::uint32_t i, std::uint32_t neighbor) {
@@ -91,16 +99,18 @@ std::vector<Edge> sorted_edges(const Points& points, const Points& normals, cons
   };
   const auto keep = [&](std::uint32_t i, std::uint32_t b) { return i < b || !is_listed(b, i); };
   const auto repeats = [&](std::uint32_t i) { return i > 0 && points[i] == points[i - 1]; };
-  parallel_for(n, [&](std::size_t begin, std::size_t end) {
+  const auto count_edges = [&](std::size_t begin, std::size_t end) {
     for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
       std::uint32_t count = repeats(i) ? 1 : 0;
       for (std::uint32_t j = 0; j < graph.k; ++j) count += keep(i, graph.index(i, j)) ? 1U : 0U;
       first[i + 1] = count;
     }
-  });
+  };
+  parallel_for(n, count_edges, kParallelBlock, context);
+  if (is_cancelled_at(0, context)) return {};
   std::partial_sum(first.begin(), first.end(), first.begin());
   std::vector<Edge> edges(first[n]);
-  parallel_for(n, [&](std::size_t begin, std::size_t end) {
+  const auto make_edges = [&](std::size_t begin, std::size_t end) {
     for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
       std::uint32_t slot = first[i];
       if (repeats(i)) edges[slot++] = make_edge(points, normals, i - 1, i);
@@ -109,12 +119,17 @@ std::vector<Edge> sorted_edges(const Points& points, const Points& normals, cons
         if (keep(i, b)) edges[slot++] = make_edge(points, normals, i, b);
       }
     }
-  });
+  };
+  parallel_for(n, make_edges, kParallelBlock, context);
+  if (is_cancelled_at(0, context)) return {};
   std::vector<std::uint32_t> offset(kWeightLevels + 1, 0);
   for (const Edge& edge : edges) ++offset[edge.weight + 1U];
   std::partial_sum(offset.begin(), offset.end(), offset.begin());
   std::vector<Edge> sorted(edges.size());
-  for (const Edge& edge : edges) sorted[offset[edge.weight]++] = edge;
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    if (is_cancelled_at(e, context)) return {};
+    sorted[offset[edges[e].weight]++] = edges[e];
+  }
   return sorted;
 }
 
@@ -153,7 +168,8 @@ struct Extremes {
 
 // Small components (specks between scans) take the side of the nearest samples of the large ones.
 void orient_small_components(const Points& points, const std::vector<std::uint32_t>& component,
-                             const std::vector<Extremes>& extremes, Points& normals) {
+                             const std::vector<Extremes>& extremes, Points& normals,
+                             const ExecutionContext* context) {
   std::vector<std::uint32_t> large;
   std::vector<float> vote(extremes.size(), 0.0F);
   for (std::uint32_t i = 0; i < points.size(); ++i) {
@@ -163,6 +179,7 @@ void orient_small_components(const Points& points, const std::vector<std::uint32
   const KdTree tree(points, large);
   std::vector<Neighbor> found;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
+    if (is_cancelled_at(i, context)) return;
     if (extremes[component[i]].size >= kSmallComponent) continue;
     tree.nearest(points[i], 1, found);
     vote[component[i]] += normals[i].dot(normals[found[0].index]);
@@ -174,10 +191,16 @@ void orient_small_components(const Points& points, const std::vector<std::uint32
 
 }  // namespace
 
-OrientationReport orient_normals(const Points& points, const NeighborGraph& graph, Points& normals) {
+OrientationReport orient_normals(const Points& points, const NeighborGraph& graph, Points& normals,
+                                 const ExecutionContext* context) {
   const auto n = static_cast<std::uint32_t>(points.size());
   SidedSets sets(n);
-  for (const Edge& edge : sorted_edges(points, normals, graph)) sets.join(edge.a, edge.b, edge.opposed);
+  const std::vector<Edge> edges = sorted_edges(points, normals, graph, context);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    if (is_cancelled_at(e, context)) break;
+    sets.join(edges[e].a, edges[e].b, edges[e].opposed);
+  }
+  if (is_cancelled_at(0, context)) return {};
 
   std::vector<std::uint32_t> component(n);
   std::vector<Extremes> extremes;
@@ -201,7 +224,7 @@ OrientationReport orient_normals(const Points& points, const NeighborGraph& grap
   for (std::uint32_t i = 0; i < n; ++i) {
     if (inward[component[i]] != 0) normals.set(i, -normals[i]);
   }
-  if (report.small_components > 0) orient_small_components(points, component, extremes, normals);
+  if (report.small_components > 0) orient_small_components(points, component, extremes, normals, context);
   return report;
 }
 

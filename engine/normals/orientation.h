@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "engine/core/execution_context.h"
 #include "engine/core/points.h"
 #include "engine/spatial/neighbor_graph.h"
 
@@ -23,7 +24,9 @@ struct OrientationReport {
 /// Shapes:      N points, N unit normals, their graph
 /// Cost:        O(N k alpha(N)) after one stable counting sort of the edges; about 14 k bytes a sample
 /// Determinism: bitwise equal for any thread count
-OrientationReport orient_normals(const Points& points, const NeighborGraph& graph, Points& normals);
+/// Cancels:     between blocks of samples and every 65,536 edges; the sides are then undetermined
+OrientationReport orient_normals(const Points& points, const NeighborGraph& graph, Points& normals,
+                                 const ExecutionContext* context = nullptr);
 
 /// Flips each normal to the side of its counterpart in `reference` (a predecessor, or an uploaded normal).
 void orient_like(const Points& reference, Points& normals);

@@ -239,5 +239,16 @@ TEST_CASE("the scale of the model does not matter") {
   }
 }
 
+TEST_CASE("an estimation that is cancelled before it starts fits no plane") {
+  const Surface surface = plane(100, 1.0, Sampling::kJittered);
+  const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
+  const ExecutionContext context;
+  context.cancel();
+  Points normal;
+  CHECK(estimate_normals(surface.position, graph, {}, normal, &context) == 0);
+  REQUIRE(normal.size() == surface.size());
+  for (std::size_t i = 0; i < normal.size(); ++i) CHECK(normal[i].isZero());
+}
+
 }  // namespace
 }  // namespace pointwright

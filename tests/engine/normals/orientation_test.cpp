@@ -2,6 +2,11 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
 #include "engine/core/parallel.h"
 #include "engine/normals/estimation.h"
 #include "tests/support/surfaces.h"
@@ -72,19 +77,31 @@ TEST_CASE("a thin plate is right on both sides and around its rim") {
   // About four spacings thick in the middle; the rim's radius is a fifteenth of a spacing.
   const Surface plate = ellipsoid(30'000, {1.0, 1.0, 0.03});
   CHECK(count_opposed(orient_scrambled(plate).normal, plate.normal) == 0);
-  // Along the rim, where the sheets come closer than one and a half spacings, estimated normals are as good
-  // as random.
-  const Oriented found = estimate_and_orient(plate.position);
-  std::size_t opposed = 0;
-  std::size_t judged = 0;
-  for (std::size_t i = 0; i < plate.size(); ++i) {
-    if (std::abs(plate.position[i].z()) < 0.01F) continue;
-    ++judged;
-    opposed += found.normal[i].dot(plate.normal[i]) < 0.0F ? 1U : 0U;
+}
+
+TEST_CASE("estimated normals of a thin plate are on their sides, on its rim as soon as that is resolved") {
+  // The rim bends within 0.0009. Where the gap g of the sheets is small beside the radius r of the
+  // neighbourhood, its samples make one flat sheet: g^2 / 4 of variance across against some r^2 / 10 along.
+  // Its normal stands at a right angle to that of the rim, and which side agrees is chance. Measured for
+  // 5,000 to 30,000 samples: opposed ones only where g < 0.25 r; from 35,000 on, none.
+  for (const std::size_t count : {10'000U, 30'000U, 60'000U}) {
+    CAPTURE(count);
+    const Surface plate = ellipsoid(count, {1.0, 1.0, 0.03});
+    const NeighborGraph graph = build_neighbor_graph(plate.position, 10);
+    const Oriented found = estimate_and_orient(plate.position);
+    std::size_t opposed = 0;
+    std::size_t judged = 0;
+    for (std::size_t i = 0; i < plate.size(); ++i) {
+      const float gap = 2.0F * std::abs(plate.position[i].z());
+      const float radius = (plate.position[graph.index(i, 9)] - plate.position[i]).norm();
+      if (gap < 0.3F * radius) continue;
+      ++judged;
+      opposed += found.normal[i].dot(plate.normal[i]) < 0.0F ? 1U : 0U;
+    }
+    CHECK(judged > count * 85 / 100);
+    CHECK(opposed == 0);
+    if (count == 60'000U) CHECK(count_opposed(found.normal, plate.normal) == 0);
   }
-  CHECK(judged > plate.size() * 60 / 100);
-  // Measured: 2 of 29,000, beside the rim, where the tangent plane is not the surface's.
-  CHECK(opposed * 5000 <= judged);
 }
 
 TEST_CASE("every component points outward by itself") {
@@ -178,6 +195,42 @@ TEST_CASE("orient_like takes the side of a reference and nothing else") {
   Points normal = scrambled_signs(surface.normal, 4);
   orient_like(surface.normal, normal);
   CHECK(normal == surface.normal);
+}
+
+TEST_CASE("orientation that is cancelled before it starts flips nothing") {
+  const Surface surface = sphere(5'000, 1.0, Sampling::kRandom);
+  const Points before = scrambled_signs(surface.normal, 5);
+  Points after = before;
+  const ExecutionContext context;
+  context.cancel();
+  const OrientationReport report =
+      orient_normals(surface.position, build_neighbor_graph(surface.position, 10), after, &context);
+  CHECK(after == before);
+  CHECK(report.components == 0);
+}
+
+TEST_CASE("a cancel from another thread ends the orientation in the middle") {
+  const Surface surface = torus(300'000, 1.0, 0.4, Sampling::kRandom);
+  const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
+  Points normal = surface.normal;
+  const auto whole_from = std::chrono::steady_clock::now();
+  orient_normals(surface.position, graph, normal);
+  const auto whole = std::chrono::steady_clock::now() - whole_from;
+  for (const int part : {1, 4, 7}) {  // tenths of the work: the edges, their order, the tree
+    CAPTURE(part);
+    const ExecutionContext context;
+    std::chrono::steady_clock::time_point cancelled_at;
+    std::thread canceller([&] {
+      std::this_thread::sleep_for(whole * part / 10);
+      cancelled_at = std::chrono::steady_clock::now();
+      context.cancel();
+    });
+    orient_normals(surface.position, graph, normal, &context);
+    const auto ended_at = std::chrono::steady_clock::now();
+    canceller.join();
+    // The allowance is for a machine that is busy otherwise.
+    CHECK(ended_at - cancelled_at < whole / 4 + std::chrono::milliseconds(100));
+  }
 }
 
 }  // namespace
