@@ -201,15 +201,58 @@ void refit_normals(const Points& position, const NeighborGraph& graph, Points& n
   normal = std::move(fitted);
 }
 
-float median_radius(const Points& position, const NeighborGraph& graph, std::uint32_t k) {
-  k = std::min(k, graph.k);
-  if (k == 0) return 0.0F;
-  std::vector<float> radius(position.size());
-  for (std::size_t i = 0; i < position.size(); ++i)
-    radius[i] = (position[graph.index(i, k - 1)] - position[i]).norm();
-  const auto middle = radius.begin() + static_cast<std::ptrdiff_t>(radius.size() / 2);
-  std::nth_element(radius.begin(), middle, radius.end());
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+// What the means over the cells smooth: the median over Q of the variance of a cell's samples about their
+// centroid, an axis of the tangent plane. A full cell has cell^2 / 12, one that a single sample fills 0.
+double cell_variance(const Points& position, const BaseSurface& base) {
+  std::vector<double> squares(base.position.size(), 0.0);
+  std::vector<double> count(base.position.size(), 0.0);
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    const std::uint32_t q = base.counterpart[i];
+    const Vec3d e = (position[i] - base.position[q]).cast<double>();
+    const double height = e.dot(base.normal[q].cast<double>());
+    squares[q] += e.squaredNorm() - height * height;
+    count[q] += 1.0;
+  }
+  for (std::size_t q = 0; q < squares.size(); ++q) squares[q] /= 2.0 * std::max(count[q], 1.0);
+  return median(std::move(squares));
+}
+
+// What the least-squares planes smooth: the median over Q of the variance of their weights (1 - d^2/r^2)^4,
+// an axis. That is r^2 / 12 on a disc, r the distance of the first sample beyond the kPlaneNeighbors nearest;
+// where Q has no such sample all of it counts, with the weights that decomposition.cpp gives it.
+double plane_variance(const BaseSurface& base) {
+  std::vector<double> variance(base.position.size());
+  parallel_for(variance.size(), [&](std::size_t begin, std::size_t end) {
+    std::vector<double> distance_sq;
+    for (std::size_t q = begin; q < end; ++q) {
+      distance_sq.clear();
+      for (std::uint32_t j = 0; j < base.graph.k; ++j) {
+        const std::uint32_t other = base.graph.index(q, j);
+        if (other == q) break;  // the rest of a short row
+        distance_sq.push_back(static_cast<double>((base.position[other] - base.position[q]).squaredNorm()));
+      }
+      if (distance_sq.size() >= kPlaneNeighbors) {
+        variance[q] = distance_sq[kPlaneNeighbors - 1] / 12.0;
+        continue;
+      }
+      const double radius_sq = distance_sq.empty() ? 0.0 : 1.5 * distance_sq.back();
+      double sum = 0.0;
+      double weights = 1.0;  // the sample itself
+      for (const double d_sq : distance_sq) {
+        const double weight = radius_sq > 0.0 ? std::pow(1.0 - d_sq / radius_sq, 4) : 1.0;
+        sum += weight * d_sq;
+        weights += weight;
+      }
+      variance[q] = 0.5 * sum / weights;
+    }
+  });
+  return median(std::move(variance));
 }
 
 }  // namespace
@@ -219,30 +262,32 @@ Result<BaseSurface> build_base_surface(const Points& position, const Points& nor
   POINTWRIGHT_CHECK(scale > 0.0F, "a base needs a scale");
   const double cell = kCellOfScale * static_cast<double>(scale);
   BaseSurface base;
-  base.scale = scale;
   gather_cells(position, normal, sort_into_cells(position, origin, cell), base);
   base.graph = same_side_graph(base.position, base.normal, context);
   if (context.is_cancelled()) return cancelled_error();
 
-  // Variances add: a cell's uniform density has cell^2 / 12 an axis, the compact weights (1 - d^2/r^2)^4 of
-  // the least-squares planes r^2 / 12; the umbrella supplies the rest of scale^2.
-  const double radius = static_cast<double>(median_radius(base.position, base.graph, kPlaneNeighbors));
+  // Variances add: the cells and the least-squares planes have theirs, the umbrella supplies the rest of
+  // scale^2.
+  double variance = cell_variance(position, base);
   const double rest =
-      static_cast<double>(scale) * static_cast<double>(scale) - (cell * cell + radius * radius) / 12.0;
+      static_cast<double>(scale) * static_cast<double>(scale) - variance - plane_variance(base);
   const NeighborGraph smoothing_graph = narrowed(base.graph, kSmoothingNeighbors);
   if (rest > 0.0 && smoothing_graph.k > 0 && base.position.size() > 2 * kSmoothingNeighbors) {
     auto smoothed =
         smooth_to_scale(base.position, base.normal, smoothing_graph, static_cast<float>(std::sqrt(rest)),
                         SmoothingDirection::kAlongNormal, &context);
     if (!smoothed) return smoothed.error();
+    const double reached = static_cast<double>(smoothed.value().scale);
+    variance += reached * reached;
     base.iterations = smoothed.value().iterations;
     base.position = std::move(smoothed).value().points;
-    refit_normals(base.position, narrowed(base.graph, kSmoothingNeighbors), base.normal);
+    refit_normals(base.position, smoothing_graph, base.normal);
     base.graph = same_side_graph(base.position, base.normal, context);
     if (context.is_cancelled()) return cancelled_error();
   } else {
     refit_normals(base.position, smoothing_graph, base.normal);
   }
+  base.scale = static_cast<float>(std::sqrt(variance + plane_variance(base)));
   return base;
 }
 

@@ -22,8 +22,11 @@ struct BaseSurface {
   Points normal;        ///< unit, on the side of the samples they stand for
   NeighborGraph graph;  ///< kCachedNeighbors neighbours on the same side; short rows repeat the sample
   std::vector<std::uint32_t> counterpart;  ///< per sample of P: the sample of Q that stands for it
-  float scale = 0.0F;                      ///< smoothing scale of the whole, model units
-  std::uint32_t iterations = 0;            ///< umbrella iterations spent
+  /// Smoothing scale of the whole that was reached, model units: the root of what grid, umbrella and
+  /// least-squares planes have as variance. Less than was asked for where Q has too few samples to be
+  /// smoothed further, more where the planes alone, over kPlaneNeighbors sparse samples, smooth more.
+  float scale = 0.0F;
+  std::uint32_t iterations = 0;  ///< umbrella iterations spent
 };
 
 /// One sample of Q for each cell of a grid with fixed origin in model space and cell 0.7 scale (two where

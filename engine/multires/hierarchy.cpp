@@ -39,7 +39,6 @@ float median(std::vector<float> values) {
 Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origin, float scale, float spacing,
                                           const ExecutionContext& context, Level& below,
                                           DecompositionReport& report) {
-  report.scale = scale;
   if (!(scale > 0.0F)) {  // all samples coincide: the surface is its own base
     below = above;
     report.base_samples = above.position.size();
@@ -47,6 +46,7 @@ Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origi
   }
   auto base = build_base_surface(above.position, above.normal, origin, scale, context);
   if (!base) return base.error();
+  report.scale = base.value().scale;
   report.base_samples = base.value().position.size();
   auto parts = decompose(above.position, above.normal, base.value(), spacing, DecomposeParams{}, context);
   if (!parts) return parts.error();
@@ -115,11 +115,12 @@ Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& par
   result.spacing = local_spacing(cloud.position, result.graph);
 
   context.begin_phase("normals", 0.35);
-  estimate_normals(cloud.position, result.graph, NormalParams{}, finest.normal);
+  estimate_normals(cloud.position, result.graph, NormalParams{}, finest.normal, &context);
+  if (context.is_cancelled()) return cancelled_error();
   if (cloud.has_normals()) {
     finest.normal = adopt_normals(cloud.normal, finest.normal);
   } else {
-    result.component_count = orient_normals(cloud.position, result.graph, finest.normal).components;
+    result.component_count = orient_normals(cloud.position, result.graph, finest.normal, &context).components;
   }
   if (context.is_cancelled()) return cancelled_error();
 

@@ -26,7 +26,7 @@ Result<void> validate(const HierarchyParams& params);
 
 /// How the damped Newton iteration of one band ended (§3.4).
 struct DecompositionReport {
-  float scale = 0.0F;            ///< of the band's base, model units
+  float scale = 0.0F;            ///< that the band's base has reached, model units (BaseSurface::scale)
   std::size_t base_samples = 0;  ///< samples of the coarse cloud Q that carries the base surface
   std::size_t at_limit = 0;      ///< samples whose iteration ended at the limit, above the tolerance
   std::size_t fallback = 0;      ///< of those and the flipped: samples that took the fallback plane

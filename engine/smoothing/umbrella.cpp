@@ -21,6 +21,13 @@ constexpr double kExhausted = 0.01;
 // Bounds of a sample's part of lambda = 0.5: plain steps are stable up to 1.2.
 constexpr double kLeastRate = 0.25;
 constexpr double kGreatestRate = 1.6;
+// Determinant over squared trace of a flat neighbourhood's scatter, below which it is a line.
+constexpr double kCollinear = 1e-12;
+
+// Where the weight of neighbour j of sample i stands, in the graph's layout.
+std::size_t slot_of(const NeighborGraph& graph, std::size_t i, std::uint32_t j) {
+  return (i / kSimdBlock * graph.k + j) * kSimdBlock + i % kSimdBlock;
+}
 
 // Normalised umbrella weights per neighbour, in the graph's layout; empty for uniform ones.
 std::vector<float> rest_weights(const Points& points, const NeighborGraph& graph) {
@@ -29,15 +36,12 @@ std::vector<float> rest_weights(const Points& points, const NeighborGraph& graph
   parallel_for(graph.count, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       float sum = 0.0F;
-      const auto slot = [&](std::uint32_t j) {
-        return (i / kSimdBlock * graph.k + j) * kSimdBlock + i % kSimdBlock;
-      };
       for (std::uint32_t j = 0; j < graph.k; ++j) {
         const float distance = (points[graph.index(i, j)] - points[i]).norm() + 0.3F * spacing[i];
-        weights[slot(j)] = distance > 0.0F ? 1.0F / distance : 1.0F;
-        sum += weights[slot(j)];
+        weights[slot_of(graph, i, j)] = distance > 0.0F ? 1.0F / distance : 1.0F;
+        sum += weights[slot_of(graph, i, j)];
       }
-      for (std::uint32_t j = 0; j < graph.k; ++j) weights[slot(j)] /= sum;
+      for (std::uint32_t j = 0; j < graph.k; ++j) weights[slot_of(graph, i, j)] /= sum;
     }
   });
   return weights;
@@ -76,23 +80,63 @@ Vec3f umbrella(const Points& points, const NeighborGraph& graph, const std::vect
     return graph.k > 0 ? Vec3f(sum / static_cast<float>(graph.k)) : sum;
   }
   for (std::uint32_t j = 0; j < graph.k; ++j) {
-    const float weight = weights[(i / kSimdBlock * graph.k + j) * kSimdBlock + i % kSimdBlock];
+    const float weight = weights[slot_of(graph, i, j)];
     sum += weight * (points[graph.index(i, j)] - p);
   }
   return sum;
 }
 
-// Mean squared distance to the neighbours: lambda times this is the variance that a step adds to a sample's
-// weights.
-std::vector<double> mean_squares(const Points& points, const NeighborGraph& graph) {
+// What a step along the normals does to heights over the tangent planes. The normal is that of the plane
+// fitted to a sample and its neighbours, so n . u leaves out of the umbrella vector u what a plane's slope
+// would give: sum (f_j - f_i) / k - u . grad f, grad f the least-squares gradient. That is an umbrella with
+// weights 1 / k - c_j, c_j = (y_j - m)' C^-1 u, m and C the mean and the scatter of the k + 1 points y: plane
+// heights stay, so the weights' mean stays on the sample. Each c_j is at most (k + 1) / k, the leverages
+// being at most 1.
+std::vector<float> level_weights(const Points& points, const Points& normals, const NeighborGraph& graph) {
+  std::vector<float> weights(graph.lanes.size(), 0.0F);
+  parallel_for(graph.count, [&](std::size_t begin, std::size_t end) {
+    std::vector<Eigen::Vector2d> y(graph.k);
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3d along = normals[i].cast<double>().unitOrthogonal();
+      const Vec3d across = normals[i].cast<double>().cross(along);
+      Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+      Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        const Vec3d e = (points[graph.index(i, j)] - points[i]).cast<double>();
+        y[j] = {e.dot(along), e.dot(across)};
+        sum += y[j];
+        scatter += y[j] * y[j].transpose();
+      }
+      const Eigen::Vector2d mean = sum / static_cast<double>(graph.k + 1);
+      scatter -= static_cast<double>(graph.k + 1) * mean * mean.transpose();
+      const double size = scatter.trace();
+      const bool spans_plane = scatter.determinant() > kCollinear * size * size;
+      const Eigen::Vector2d slope =
+          spans_plane ? Eigen::Vector2d(scatter.inverse() * sum / static_cast<double>(graph.k))
+                      : Eigen::Vector2d(Eigen::Vector2d::Zero());
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        weights[slot_of(graph, i, j)] =
+            static_cast<float>(1.0 / static_cast<double>(graph.k) - slope.dot(y[j] - mean));
+      }
+    }
+  });
+  return weights;
+}
+
+// Mean squared distance to the neighbours, plain (no weights) or weighted: lambda times this is the variance
+// that a step adds to a sample's weights.
+std::vector<double> mean_squares(const Points& points, const NeighborGraph& graph,
+                                 const std::vector<float>& weights = {}) {
   std::vector<double> result(points.size());
   parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       double sum = 0.0;
       for (std::uint32_t j = 0; j < graph.k; ++j) {
-        sum += static_cast<double>((points[graph.index(i, j)] - points[i]).squaredNorm());
+        const auto square = static_cast<double>((points[graph.index(i, j)] - points[i]).squaredNorm());
+        sum += weights.empty() ? square / static_cast<double>(graph.k)
+                               : static_cast<double>(weights[slot_of(graph, i, j)]) * square;
       }
-      result[i] = sum / static_cast<double>(graph.k);
+      result[i] = sum;
     }
   });
   return result;
@@ -123,17 +167,20 @@ std::vector<double> step_rates(const std::vector<double>& gain, const NeighborGr
 // The variance that the steps have given to the weights of each sample's neighbourhood, in double precision.
 //
 // Free steps: rows of W^n; |p|^2 and p under the same steps give it about the mean, and samples drift to that
-// mean. Steps along the normals leave out the drift: a step adds its gain, about the sample itself, and
-// carries on what the neighbours have. On random samplings the two differ by a third, hence each direction
-// has its own.
+// mean. Steps along the normals leave the drift out (level_weights) and keep the mean on the sample: a step
+// adds its gain and carries on, under the same weights, what the neighbours have. The first of them takes the
+// normals that it is given for the surface's own, which have no error of a fit: its gain is the plain one.
 class KernelVariance {
  public:
-  KernelVariance(const Points& points, const NeighborGraph& graph, SmoothingDirection direction)
+  KernelVariance(const Points& points, const Points& normals, const NeighborGraph& graph,
+                 SmoothingDirection direction)
       : graph_(&graph), is_free_(direction == SmoothingDirection::kFree), columns_(is_free_ ? 4 : 1) {
     for (auto& c : columns_) c.resize(points.size());
     if (!is_free_) {
-      gain_ = mean_squares(points, graph);
-      rate_ = step_rates(gain_, graph);
+      weights_ = level_weights(points, normals, graph);
+      first_gain_ = mean_squares(points, graph);
+      gain_ = mean_squares(points, graph, weights_);
+      rate_ = step_rates(first_gain_, graph);
       return;
     }
     const Box3f box = bounds_of(points);
@@ -148,17 +195,27 @@ class KernelVariance {
   // A sample's part of a step's lambda.
   [[nodiscard]] double rate(std::size_t i) const { return is_free_ ? 1.0 : rate_[i]; }
 
-  void step(double lambda) {
-    for (auto& c : columns_) {
-      std::vector<double> next(c.size());
+  // The columns after one more step of lambda.
+  [[nodiscard]] std::vector<std::vector<double>> stepped(double lambda) const {
+    std::vector<std::vector<double>> result = columns_;
+    for (std::size_t column = 0; column < columns_.size(); ++column) {
+      const std::vector<double>& c = columns_[column];
       for_each_sample([&](std::size_t i) {
         double sum = 0.0;
-        for (std::uint32_t j = 0; j < graph_->k; ++j) sum += c[graph_->index(i, j)];
-        const double gain = is_free_ ? 0.0 : gain_[i];
-        next[i] = c[i] + lambda * rate(i) * (sum / static_cast<double>(graph_->k) - c[i] + gain);
+        for (std::uint32_t j = 0; j < graph_->k; ++j) {
+          const double weight = is_free_ ? 1.0 / static_cast<double>(graph_->k)
+                                         : static_cast<double>(weights_[slot_of(*graph_, i, j)]);
+          sum += weight * (c[graph_->index(i, j)] - c[i]);
+        }
+        const double gain = is_free_ ? 0.0 : is_first_ ? first_gain_[i] : gain_[i];
+        result[column][i] = c[i] + lambda * rate(i) * (sum + gain);
       });
-      c.swap(next);
     }
+    return result;
+  }
+  void step(double lambda) {
+    columns_ = stepped(lambda);
+    is_first_ = false;
   }
 
   // Median over the samples of the variance per axis, half of the whole on a surface.
@@ -183,7 +240,9 @@ class KernelVariance {
   const NeighborGraph* graph_;
   bool is_free_;
   std::vector<std::vector<double>> columns_;  // x y z |p|^2; or the variance itself
-  std::vector<double> gain_, rate_;           // along the normals
+  std::vector<float> weights_;                // along the normals, as the next three
+  std::vector<double> first_gain_, gain_, rate_;
+  bool is_first_ = true;
 };
 
 // Normals of the smoothed samples, on the side of the old ones, which stay where the neighbours span no
@@ -293,7 +352,7 @@ Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& norm
   ScaledSmoothing result{.points = points};
   const double goal = static_cast<double>(scale) * static_cast<double>(scale);
   if (graph.k == 0 || goal == 0.0) return result;
-  KernelVariance variance(points, graph, direction);
+  KernelVariance variance(points, normals, graph, direction);
   Points current = normals;
   Points change(points.size());
   double reached = 0.0;

@@ -56,10 +56,12 @@ Result<Points> smooth(const Points& points, const Points& normals, const Neighbo
 /// variance of the weights that the steps have given to the rest neighbourhood of sample i, so the scale
 /// means the same at every density and on uneven samplings.
 ///   kFree: var_i = (W^n |p|^2)_i - |(W^n p)_i|^2.
-///   kAlongNormal: samples do not drift, so the variance is that about the sample; dense samples take smaller
-///   steps, sparse ones larger, so that every s_i is near the median; the normals are fitted anew, on their
-///   old sides, before each step but the first.
-/// A cloud that is too small for the scale is smoothed until nothing changes any more.
+///   kAlongNormal: the normals are fitted anew, on their old sides, before each step but the first, so
+///   heights that are linear over a neighbourhood stay and the variance, about the sample itself, is that of
+///   umbrella weights less the part of a least-squares slope; dense samples take smaller steps, sparse ones
+///   larger, so that every s_i is near the median.
+/// Smoothing ends before the scale where a step adds less than a hundredth of the first one's variance, as on
+/// an object that is smaller than the scale.
 struct ScaledSmoothing {
   Points points;
   std::uint32_t iterations = 0;

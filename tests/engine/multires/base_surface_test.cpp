@@ -37,7 +37,8 @@ TEST_CASE("every sample has a counterpart nearby, on its own side") {
     CHECK(base.position.size() < surface.size());
     CHECK(base.normal.size() == base.position.size());
     CHECK(base.graph.count == base.position.size());
-    CHECK(base.scale == static_cast<float>(kScale));
+    // Measured 0.149 to 0.150: the planes smooth a little less once the smoothing has drawn Q together.
+    CHECK(relative_error(static_cast<double>(base.scale), kScale) < 0.01);
     REQUIRE(base.counterpart.size() == surface.size());
     std::size_t opposed = 0;
     for (std::size_t i = 0; i < surface.size(); ++i) {
@@ -58,16 +59,18 @@ TEST_CASE("every sample has a counterpart nearby, on its own side") {
 }
 
 TEST_CASE("a wave in the base is attenuated as by a Gaussian of the scale") {
-  // Measured on the heights of the base points, grid, umbrella and moving least squares together: the
-  // effective scale is 1.00 to 1.06 of the one asked for.
+  // On the heights of the base points: grid, umbrella and least squares together. The sheet lies in the
+  // middle of a layer of cells: their boundary along the nodes of the wave would cut the cells there, and
+  // only there.
   constexpr double kScale = 4.0;  // spacings
   constexpr std::size_t kSide = 160;
+  const Vec3d middle(0.0, 0.0, 0.35 * kScale);
   for (const Sampling sampling : {Sampling::kJittered, Sampling::kRandom}) {
     for (const double periods : {4.0, 5.0, 6.0, 8.0, 12.0}) {
       const double wavelength = periods * kScale;
       const double height = 0.005 * wavelength;
       const Surface surface = wave(kSide, 1.0, sampling, height, wavelength);
-      const Decomposition parts = decomposed(surface, base_of(surface, kScale), 1.0);
+      const Decomposition parts = decomposed(surface, base_of(surface, kScale, middle), 1.0);
       double product = 0.0;
       double square = 0.0;
       for (std::size_t i = 0; i < surface.size(); ++i) {
@@ -83,10 +86,27 @@ TEST_CASE("a wave in the base is attenuated as by a Gaussian of the scale") {
       MESSAGE(std::string(sampling == Sampling::kRandom ? "random" : "jittered")
               << ", wavelength " << periods << " scales: " << attenuation << ", expected " << expected
               << ", effective scale " << effective / kScale);
-      CHECK(relative_error(effective, kScale) < 0.10);
+      CHECK(relative_error(effective, kScale) < 0.02);
       CHECK(parts.fallback == 0);
     }
   }
+}
+
+TEST_CASE("the base says what scale it has reached") {
+  // More than was asked for where samples are sparse: nothing but the planes over 17 samples smooths there,
+  // and they do so by r^2 / 12, r^2 = 17 h^2 / pi, the same for every lesser scale.
+  const Surface sparse = sphere(2'000, 1.0, Sampling::kRegular);
+  const double spacing = std::sqrt(2.0 * kTau / 2'000.0);
+  for (const double scale : {0.1, 0.5}) {  // in spacings
+    const double reached = static_cast<double>(base_of(sparse, scale * spacing).scale);
+    CHECK(relative_error(reached, spacing * std::sqrt(17.0 / (12.0 * 0.5 * kTau))) < 0.05);
+  }
+  // Less where a few cells hold the whole object: no Gaussian of 50 fits onto a sheet of 10 by 10, whose
+  // samples have a variance of 100 / 12 along each side.
+  const BaseSurface small = base_of(plane(40, 0.25, Sampling::kRegular), 50.0);
+  CHECK(small.position.size() <= 8);
+  CHECK(small.scale > 2.0F);
+  CHECK(small.scale < 3.0F);
 }
 
 TEST_CASE("the base of a sphere is the sphere that a Gaussian makes of it") {
@@ -106,7 +126,7 @@ TEST_CASE("the base of a sphere is the sphere that a Gaussian makes of it") {
     const double expected = 1.0 - std::exp(-scale * scale);
     MESSAGE("scale " << scale << ": shrinks by " << shrink << ", expected " << expected << ", rms unevenness "
                      << std::sqrt(square / static_cast<double>(surface.size())));
-    CHECK(relative_error(shrink, expected) < 0.06);
+    CHECK(relative_error(shrink, expected) < (scale < 0.25 ? 0.01 : 0.03));
     CHECK(std::sqrt(square / static_cast<double>(surface.size())) < 0.07 * expected);
   }
 }

@@ -153,7 +153,7 @@ TEST_CASE("a bump pattern below the scale comes back as the detail coefficients"
   CHECK(pd / std::sqrt(pp * dd) > 0.985);
   CHECK(std::sqrt(error / pp) < 0.16);
   // The mean: the base of a sphere lies s^2 / R below it.
-  CHECK(relative_error(detail_mean, scale * scale) < 0.06);
+  CHECK(relative_error(detail_mean, scale * scale) < 0.02);
 }
 
 TEST_CASE("where the walk may take no step, the tree finds the same base points") {

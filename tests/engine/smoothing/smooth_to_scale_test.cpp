@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/smoothing/umbrella.h"
@@ -50,33 +51,55 @@ Run attenuate(Sampling sampling, double spacing, double wavelength, double scale
           result.value().iterations};
 }
 
+// The standard deviation of the Gaussian that attenuates like this.
+double effective_scale(double attenuation, double wavelength) {
+  return wavelength / kTau * std::sqrt(-2.0 * std::log(attenuation));
+}
+
 TEST_CASE("a wave is attenuated as by a Gaussian of that standard deviation") {
+  constexpr double kScale = 4.0;
   for (const Sampling sampling : {Sampling::kJittered, Sampling::kRandom}) {
     for (const SmoothingDirection direction : {SmoothingDirection::kFree, SmoothingDirection::kAlongNormal}) {
       for (const double wavelength : {15.0, 24.0}) {
-        constexpr double kScale = 4.0;
+        const bool is_random = sampling == Sampling::kRandom;
+        const bool is_free = direction == SmoothingDirection::kFree;
+        if (is_random && is_free && wavelength < 20.0) continue;  // the next test
         const Run run = attenuate(sampling, 1.0, wavelength, kScale, direction);
-        const double expected = std::exp(-0.5 * kTau * kTau * kScale * kScale / (wavelength * wavelength));
-        const double effective = std::sqrt(std::log(run.attenuation) / std::log(expected));
-        MESSAGE(std::string(sampling == Sampling::kRandom ? "random" : "jittered")
-                << std::string(direction == SmoothingDirection::kFree ? ", free" : ", along normals")
-                << ", wavelength " << wavelength << ": " << run.attenuation << ", expected " << expected
-                << ", effective scale " << effective);
-        // The amplitude within ten per cent where the wave is long. Where only a quarter of it is left,
-        // clumps, which smooth less than the median, keep a little more of it: the scale is within nine per
-        // cent still.
-        CHECK(relative_error(effective, 1.0) < 0.1);
-        if (wavelength > 20.0) CHECK(relative_error(run.attenuation, expected) < 0.10);
+        const double effective = effective_scale(run.attenuation, wavelength);
+        MESSAGE(std::string(is_random ? "random" : "jittered")
+                << std::string(is_free ? ", free" : ", along normals") << ", wavelength " << wavelength
+                << ": " << run.attenuation << ", effective scale " << effective / kScale);
+        // Measured over five seeds: within 0.9 % jittered, within 2.6 % random along the normals, 3.5 % free.
+        const double bound = !is_random ? 0.015 : is_free ? 0.04 : 0.03;
+        CHECK(relative_error(effective, kScale) < bound);
       }
     }
   }
+}
+
+TEST_CASE("free steps on a random sampling approach the Gaussian of a short wave as the density grows") {
+  // Samples that drift into clumps have weights with a longer tail than a Gaussian's: mean excess kurtosis
+  // 1.1, 0.8 and 0.4 measured at spacings of 2, 1 and 0.5, and with this fourth cumulant exp(-k^2 v/2 + k^4
+  // c/24) gives the attenuation of wavelength 15 within 8 %. So the error is the sampling's and goes with it.
+  constexpr double kScale = 4.0;
+  constexpr double kWavelength = 15.0;
+  std::vector<double> error;
+  for (const double spacing : {2.0, 1.0, 0.5}) {
+    const Run run = attenuate(Sampling::kRandom, spacing, kWavelength, kScale, SmoothingDirection::kFree);
+    error.push_back(1.0 - effective_scale(run.attenuation, kWavelength) / kScale);
+    MESSAGE("spacing " << spacing << ": effective scale short by " << error.back());
+  }
+  CHECK(error[0] < 0.14);
+  CHECK(error[1] < 0.10);
+  CHECK(error[2] < 0.05);
+  CHECK(error[2] < 0.7 * error[1]);
 }
 
 TEST_CASE("a scale means the same at two densities") {
   const Run coarse = attenuate(Sampling::kRandom, 1.0, 20.0, 4.0, SmoothingDirection::kAlongNormal);
   const Run fine = attenuate(Sampling::kRandom, 0.7, 20.0, 4.0, SmoothingDirection::kAlongNormal);
   CHECK(fine.iterations > 3 * coarse.iterations / 2);
-  CHECK(relative_error(fine.attenuation, coarse.attenuation) < 0.08);
+  CHECK(relative_error(fine.attenuation, coarse.attenuation) < 0.04);
 }
 
 TEST_CASE("scale 0 and clouds without neighbours stay as they are") {
@@ -105,23 +128,60 @@ TEST_CASE("a scale that is negative or not finite is refused") {
   }
 }
 
-TEST_CASE("a cloud that is too small for the scale is smoothed as far as it goes, and says how far") {
-  const Surface surface = sphere(300, 1.0, Sampling::kRandom);
-  const auto result =
-      smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10), 50.0F,
-                      SmoothingDirection::kFree);
-  REQUIRE(result.ok());
-  CHECK(result.value().iterations < 1000);
-  // All samples in one place: the variance of a unit sphere is 1, half of it an axis of a surface.
-  CHECK(relative_error(static_cast<double>(result.value().scale), std::sqrt(0.5)) < 0.1);
-  // From 3.5: what is left is a strand that the directed graph contracts last (0.66 measured).
-  CHECK(bounds_of(result.value().points).diagonal() < 0.8F);
+TEST_CASE("a closed cloud that is too small for the scale is smoothed as far as it goes, and says how far") {
+  // Smoothing ends where a step adds a hundredth of the first one's variance. On an even unit sphere that
+  // gain goes as the squared radius, so a radius of 0.1 is left, a diagonal of 0.1 * 2 sqrt 3, and a variance
+  // of 1 - 0.1^2.
+  for (const std::size_t count : {300U, 1'000U}) {
+    const Surface surface = sphere(count, 1.0, Sampling::kRegular);
+    const auto result =
+        smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10), 50.0F,
+                        SmoothingDirection::kFree);
+    REQUIRE(result.ok());
+    CHECK(relative_error(static_cast<double>(result.value().scale), std::sqrt(0.5 * 0.99)) < 0.002);
+    CHECK(relative_error(static_cast<double>(bounds_of(result.value().points).diagonal()),
+                         0.2 * std::sqrt(3.0)) < 0.05);
+  }
+}
+
+TEST_CASE("a random closed cloud ends further out, as its slowest wave outlives the median") {
+  // The gain goes as rate * radius^2, and a slow wave has a lower rate: 0.34 of an even sphere's measured for
+  // 1,000 samples. Over twelve clouds the median sample ends at 0.12 to 0.18 from the middle. The graph is one
+  // closed class, so all of it goes in time: 0.15 to 0.30 of the diagonal is left after twice the steps.
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Surface surface = sphere(300, 1.0, Sampling::kRandom, seed);
+    const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
+    const auto result =
+        smooth_to_scale(surface.position, surface.normal, graph, 50.0F, SmoothingDirection::kFree);
+    REQUIRE(result.ok());
+    CHECK(relative_error(static_cast<double>(result.value().scale), std::sqrt(0.5 * 0.975)) < 0.015);
+    const float left = bounds_of(result.value().points).diagonal();
+    const auto twice =
+        smooth(surface.position, {}, graph, {.lambda = 0.5F, .iterations = 2 * result.value().iterations});
+    REQUIRE(twice.ok());
+    CHECK(bounds_of(twice.value()).diagonal() < 0.31F * left);
+  }
+}
+
+TEST_CASE("a sheet that is too small for the scale says how far it was smoothed") {
+  // Steps along the normals keep linear functions, so the mean of the weights stays on the sample while they
+  // spread: they end in the corners, with the variance x (side - x) an axis, 0.41^2 side^2 in the median over
+  // the sheet.
+  for (const std::size_t side : {12U, 24U}) {
+    const Surface surface = plane(side, 1.0, Sampling::kJittered);
+    const auto result =
+        smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10), 1e4F,
+                        SmoothingDirection::kAlongNormal);
+    REQUIRE(result.ok());
+    MESSAGE("side " << side << ": reached " << result.value().scale);
+    CHECK(relative_error(static_cast<double>(result.value().scale), 0.41 * static_cast<double>(side)) < 0.08);
+  }
 }
 
 TEST_CASE("a scale that needs too many iterations is refused with the greatest that can be had") {
-  const Surface surface = plane(12, 1.0, Sampling::kJittered);
+  const Surface surface = sphere(300, 1.0, Sampling::kRandom);
   const auto result =
-      smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 4), 1e4F,
+      smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10), 1e4F,
                       SmoothingDirection::kAlongNormal);
   REQUIRE_FALSE(result.ok());
   CHECK(result.error().code == ErrorCode::kInvalidArgument);
