@@ -102,21 +102,23 @@ std::size_t key_frame_bytes(const FrameLayout& layout, std::uint16_t attributes)
 
 /// Writes the key frame of the columns to `out`, whose storage is reused.
 /// Pre:         columns of layout.sample_count() samples; those that `attributes` names are there (t, detail
-/// and
-///              stretch may be empty); the frame stays below 4 GiB (LogicError otherwise)
+///              and stretch may be empty); the frame stays below 4 GiB (LogicError otherwise)
 /// Cost:        O(N), vectorised, parallel over blocks
 /// Determinism: bitwise equal for any thread count and machine
 void encode_key_frame(const FrameLayout& layout, const FrameColumns& columns, const FrameState& state,
                       std::uint16_t attributes, FrameBytes& out);
 
 /// Writes the delta frame with the given blocks. The receiver's last frame must have had the same layout,
-/// level, attributes, origin and ranges; a change of these takes a key frame. Pre: as encode_key_frame;
-/// blocks strictly ascending and < block_count. Cost: O(samples of the blocks).
+/// level, attributes, origin and ranges; a change of these takes a key frame.
+/// Pre:  as encode_key_frame; blocks strictly ascending and < block_count
+/// Cost: O(samples of the blocks)
 void encode_delta_frame(const FrameLayout& layout, const FrameColumns& columns, const FrameState& state,
                         std::uint16_t attributes, std::span<const std::uint32_t> blocks, FrameBytes& out);
 
 /// The blocks in which any column that `attributes` names differs, ascending. Columns that are the same
-/// memory in both are equal without a look. Pre: both as in encode_key_frame. Cost: O(N), parallel.
+/// memory in both are equal without a look.
+/// Pre:  both as in encode_key_frame
+/// Cost: O(N), parallel
 std::vector<std::uint32_t> changed_blocks(const FrameLayout& layout, const FrameColumns& before,
                                           const FrameColumns& after, std::uint16_t attributes);
 

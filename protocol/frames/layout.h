@@ -26,7 +26,8 @@ struct SampleRange {
 class FrameLayout {
  public:
   FrameLayout() : FrameLayout(0) {}
-  /// Pre: 1 <= block_size <= kMaxBlockSize; sample_count <= 2^31. Cost: O(blocks).
+  /// Pre:  1 <= block_size <= kMaxBlockSize; sample_count <= 2^31
+  /// Cost: O(blocks)
   explicit FrameLayout(std::uint32_t sample_count, std::uint32_t block_size = kDefaultBlockSize);
 
   [[nodiscard]] std::uint32_t sample_count() const { return sample_count_; }

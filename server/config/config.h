@@ -31,7 +31,7 @@ struct Config {
   std::string log_file;            ///< empty: standard error
   std::uint32_t threads = 0;       ///< for computing; 0: all of the machine's
   Limits limits;
-  /// Variables with our prefix that set nothing: warned of, since an environment is shared with others' names.
+  /// Variables with our prefix that set nothing: warned of, since others' names share the environment.
   std::vector<std::string> unknown_variables;
   friend bool operator==(const Config&, const Config&) = default;
 };

@@ -20,7 +20,7 @@ Outcome<Done> check_query(const RequestHead& head, const std::vector<std::string
 /// The parameter's text, where it was given.
 std::optional<std::string> query_value(const RequestHead& head, std::string_view name);
 
-/// ?attributes=normal,t,detail,color,marks,ids,radius as the bits of a frame. `fallback` where it is not given.
+/// ?attributes=normal,t,detail,color,marks,ids,radius as the bits of a frame; `fallback` where it is absent.
 Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t allowed,
                                         std::uint16_t fallback);
 
@@ -33,8 +33,8 @@ struct Format {
   std::string_view media_type;
   std::string_view extension;
 };
-/// The format that ?format= names, or else the first that Accept lists, or else formats[0]. Problems:
-/// kInvalidValue, kNotAcceptable.
+/// The format that ?format= names, or else the first that Accept lists, or else formats[0].
+/// Problems: kInvalidValue, kNotAcceptable
 Outcome<Format> negotiated_format(const RequestHead& head, const std::vector<Format>& formats);
 
 /// Whether Accept names the media type (q=0 counts as not).

@@ -63,8 +63,8 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<Painted> replace_painting(RegionKind kind, std::vector<PaintOperation> operations);
 
   /// Asks for a preview to be shown. Returns once it is known to be possible; it is computed afterwards,
-  /// unless a newer one replaces it before. Problems: wrong state, invalid edits, regions that are empty or
-  /// meet.
+  /// unless a newer one replaces it before.
+  /// Problems: wrong state, invalid edits, regions that are empty or meet
   Outcome<Done> put_preview(const protocol::PreviewRequest& request);
   /// Computes a preview's key frame without showing it to anyone.
   Outcome<SharedFrame> render_preview(const protocol::PreviewRequest& request, std::uint16_t attributes);

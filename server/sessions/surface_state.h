@@ -43,12 +43,14 @@ struct SurfaceState {
 std::uint64_t memory_of(const SurfaceState& state);
 
 /// The state with `level` valid: derives the hierarchy of the current surface where it is not. The finest
-/// level keeps its bits. Errors: kCancelled and those of the builder.
+/// level keeps its bits.
+/// Errors: kCancelled and those of the builder
 Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState& state, std::uint32_t level,
                                       const ExecutionContext& context);
 
-/// t on the samples of a level, from the marks. Pre: the level is valid. Errors: kEmptyRegion,
-/// kRegionsIntersect.
+/// t on the samples of a level, from the marks.
+/// Pre:    the level is valid
+/// Errors: kEmptyRegion, kRegionsIntersect
 Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const SurfaceState& state,
                                                    std::uint32_t level, Blend blend, const Marks& marks);
 

@@ -76,7 +76,8 @@ void try_json(std::span<const std::byte> bytes) {
     promise(!document.errors().summary().empty(), "a refusal says why");
     return;
   }
-  promise(Json::parse(document.value().dump()) == document.value(), "what was parsed can be printed and read");
+  promise(Json::parse(document.value().dump()) == document.value(),
+          "what was parsed can be printed and read");
   take(document.value(), parse_paint_operation);
   take(document.value(), parse_painting);
   take(document.value(), parse_edit);

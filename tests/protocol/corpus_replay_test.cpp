@@ -1,5 +1,5 @@
-// The seeds of the protocol's fuzzing targets and what was found worth keeping: each through its target's code
-// on every test run. The golden documents are seeds of the JSON target.
+// The seeds of the protocol's fuzzing targets and what was found worth keeping: each through its target's
+// code on every test run. The golden documents are seeds of the JSON target.
 #include <doctest/doctest.h>
 
 #include <filesystem>
