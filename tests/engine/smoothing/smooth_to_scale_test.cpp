@@ -147,7 +147,8 @@ TEST_CASE("a closed cloud that is too small for the scale is smoothed as far as 
 TEST_CASE("a random closed cloud ends further out, as its slowest wave outlives the median") {
   // The gain goes as rate * radius^2, and a slow wave has a lower rate: 0.34 of an even sphere's measured for
   // 1,000 samples. Over twelve clouds the median sample ends at 0.12 to 0.18 from the middle. The graph is
-  // one closed class, so all of it goes in time: 0.15 to 0.30 of the diagonal is left after twice the steps.
+  // one closed class, so all of it goes in time: 0.15 to 0.30 of the diagonal is left after twice the
+  // steps.
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Surface surface = sphere(300, 1.0, Sampling::kRandom, seed);
     const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
