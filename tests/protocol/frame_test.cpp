@@ -230,6 +230,26 @@ TEST_CASE("the bounds are the ball around the bounding box, in keys and deltas a
   CHECK(decoded(bytes).header.bounds.radius == 9.0F);
 }
 
+TEST_CASE("radii come within half a step of bfloat16, and in key frames only") {
+  golden::Columns columns(100);
+  for (std::uint32_t i = 0; i < 100; ++i)
+    columns.radius[i] = to_bfloat16(std::exp(static_cast<float>(i) - 50.0F));
+  for_samples(FrameLayout(100, 32), decoded(key_of(columns, 32)),
+              [&](std::uint32_t i, const DecodedBlock& block, std::uint32_t lane) {
+                const float exact = std::exp(static_cast<float>(i) - 50.0F);
+                CHECK(std::abs(from_bfloat16(block.radius[lane]) - exact) <= exact / 256.0F);
+              });
+  CHECK(to_bfloat16(1.00390625F) == 0x3F80);  // a tie: to the even one
+  CHECK(to_bfloat16(1.01171875F) == 0x3F82);
+  CHECK(to_bfloat16(0.0F) == 0);
+  FrameBytes bytes;
+  const std::vector<std::uint32_t> blocks{1};
+  encode_delta_frame(FrameLayout(100, 32), columns.view(), full_state(), kEverything, blocks, bytes);
+  const DecodedFrame delta = decoded(bytes);
+  CHECK(delta.header.attributes == (kEverything & ~kFrameRadius));
+  CHECK(delta.blocks.at(0).radius.empty());
+}
+
 TEST_CASE("a delta holds exactly the blocks that changed, encoded as in a key") {
   const golden::Columns before(20'000);
   const FrameLayout layout(20'000, 512);

@@ -354,13 +354,15 @@ TEST_CASE("samples come in every format, with tags that change with the revision
   for (const char* format : {"draco", "frame"})
     CHECK(test.get(path + "/samples?format=" + format).status == 200);
   const Answer frame =
-      test.get(path + "/samples?format=frame&attributes=normal,t,ids,marks,color,detail&level=0");
+      test.get(path + "/samples?format=frame&attributes=normal,t,ids,marks,color,detail,radius&level=0");
   const auto decoded =
       protocol::decode_frame(std::as_bytes(std::span(frame.bytes.data(), frame.bytes.size())));
   REQUIRE(decoded.ok());
   CHECK(decoded.value().header.level == 0);
   CHECK(decoded.value().header.revision == 3);
   CHECK(decoded.value().header.attributes == protocol::kAllFrameAttributes);
+  for (const auto& block : decoded.value().blocks)
+    for (const std::uint16_t radius : block.radius) CHECK(protocol::from_bfloat16(radius) > 0.0F);
   CHECK(test.get(path + "/samples?level=2").status == 422);
   CHECK(test.get(path + "/samples?level=x").status == 422);
   CHECK(test.get(path + "/samples?format=frame&attributes=smell").status == 422);

@@ -319,6 +319,8 @@ test("the picture comes back after the graphics context was lost", { timeout }, 
   });
   await page.waitForTimeout(600);
   await waitForIdle(page, waitMs);
+  // The notice lies over the picture while it shows.
+  await page.locator(".toast").waitFor({ state: "detached", timeout: waitMs });
   const after = await countPixels(page);
   assert.ok(
     Math.abs(after.surface - before.surface) < 0.05 * before.surface,
