@@ -37,6 +37,8 @@ class NearestSet {
 
   [[nodiscard]] std::size_t size() const { return count_; }
   [[nodiscard]] bool full() const { return count_ == slots_.size(); }
+  // nanoflann calls this and worstDist().
+  // NOLINTNEXTLINE(readability-identifier-naming)
   bool addPoint(float distance_sq, std::uint32_t i) {
     const Neighbor candidate{subset_.empty() ? i : subset_[i], distance_sq};
     if (full() && !(candidate < slots_[count_ - 1])) return true;
@@ -49,6 +51,7 @@ class NearestSet {
     return true;
   }
   // nanoflann looks at what is nearer than this: ties with the last one must come in, too.
+  // NOLINTNEXTLINE(readability-identifier-naming)
   [[nodiscard]] float worstDist() const { return bound_; }
 
  private:

@@ -12,10 +12,10 @@ namespace pointwright::server {
 template <typename T>
 class [[nodiscard]] Outcome {
  public:
-  Outcome(T value)
-      : state_(std::in_place_index<0>, std::move(value)) {}  // NOLINT(google-explicit-constructor)
-  Outcome(protocol::Problem problem)                         // NOLINT(google-explicit-constructor)
-      : state_(std::in_place_index<1>, std::move(problem)) {}
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  Outcome(T value) : state_(std::in_place_index<0>, std::move(value)) {}
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  Outcome(protocol::Problem problem) : state_(std::in_place_index<1>, std::move(problem)) {}
   [[nodiscard]] bool ok() const { return state_.index() == 0; }
   [[nodiscard]] T& value() { return std::get<0>(state_); }
   [[nodiscard]] const T& value() const { return std::get<0>(state_); }

@@ -13,7 +13,7 @@ using protocol::ProblemKind;
 
 namespace {
 
-Problem bad_parameter(const std::string& name, std::string detail) {
+Problem bad_parameter(const std::string& name, const std::string& detail) {
   return Problem{.kind = ProblemKind::kInvalidValue,
                  .detail = "the query parameter " + name.substr(0, 64) + " is not acceptable: " + detail,
                  .errors = {{.pointer = std::string(1, '?').append(name, 0, 64), .detail = detail}}};

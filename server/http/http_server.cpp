@@ -128,11 +128,12 @@ void fill(httplib::Response& out, Response response, Exchange& exchange) {
   const auto provide = [&](std::span<const std::byte> bytes, std::shared_ptr<const void> owner) {
     exchange.begin_answer(bytes.size());
     if (bytes.empty()) return;
-    out.set_content_provider(bytes.size(), response.content_type,
-                             [bytes, owner](size_t offset, size_t length, httplib::DataSink& sink) {
-                               const std::size_t count = std::min<std::size_t>(length, 1U << 20U);
-                               return sink.write(reinterpret_cast<const char*>(bytes.data()) + offset, count);
-                             });
+    out.set_content_provider(
+        bytes.size(), response.content_type,
+        [bytes, owner = std::move(owner)](size_t offset, size_t length, httplib::DataSink& sink) {
+          const std::size_t count = std::min<std::size_t>(length, 1U << 20U);
+          return sink.write(reinterpret_cast<const char*>(bytes.data()) + offset, count);
+        });
   };
   if (auto* text = std::get_if<std::string>(&response.body)) {
     const auto owner = std::make_shared<const std::string>(std::move(*text));
@@ -178,9 +179,8 @@ class HttpServer::Fence final : public httplib::Server {
       return HandlerResponse::Handled;
     });
     // Never the library's own, which sends the exception's text as a header.
-    set_exception_handler([](const httplib::Request&, httplib::Response& response, std::exception_ptr) {
-      response.status = 500;
-    });
+    set_exception_handler([](const httplib::Request&, httplib::Response& response,
+                             const std::exception_ptr&) { response.status = 500; });
   }
 
   std::optional<std::string> start() {

@@ -11,8 +11,9 @@
 extern char** environ;
 
 int main(int argc, char** argv) {
-  using namespace pointwright;
-  if (argc > 1 && std::strcmp(argv[1], kDecodeChildArgument) == 0) return decode_child_main();
+  namespace server = pointwright::server;
+  if (argc > 1 && std::strcmp(argv[1], pointwright::kDecodeChildArgument) == 0)
+    return pointwright::decode_child_main();
   server::EnvironmentNames names;
   for (char** entry = environ; *entry != nullptr; ++entry) {
     const std::string text = *entry;

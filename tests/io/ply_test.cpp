@@ -112,8 +112,9 @@ TEST_CASE("after a header of CR lines the data starts at once, even if it starts
 }
 
 TEST_CASE("all spellings of the types are one") {
-  const char* const kOld[] = {"char", "uchar", "short", "ushort", "int", "uint", "float", "double"};
-  const char* const kNew[] = {"int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"};
+  constexpr const char* kOld[] = {"char", "uchar", "short", "ushort", "int", "uint", "float", "double"};
+  constexpr const char* kNew[] = {"int8",  "uint8",  "int16",   "uint16",
+                                  "int32", "uint32", "float32", "float64"};
   std::string header = "property float x\nproperty float y\nproperty float z\n";
   for (int i = 0; i < 8; ++i) {
     header += "property " + std::string(kOld[i]) + " old" + std::to_string(i) + "\n";
