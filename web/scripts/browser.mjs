@@ -34,9 +34,9 @@ export function viewerStatus(page) {
   return page.evaluate(() => globalThis.pointwright?.status ?? null);
 }
 
-/** Waits until the viewer shows its session whole, though not yet in its final quality. */
+/** Waits until the viewer has samples to show and has framed them: a camera that is set now stays. */
 export function waitForReady(page, timeoutMs = 300_000) {
-  return waitForStatus(page, "ready", (status) => status.state === "ready", 1, timeoutMs);
+  return waitForStatus(page, "ready", (s) => s.state === "ready" && s.loadedSamples > 0, 1, timeoutMs);
 }
 
 /** Waits until the viewer shows its session whole and has nothing left to draw. */
