@@ -1,11 +1,11 @@
 // clang-tidy over every C++ source, remembered by content.
 //
 // Most of clang-tidy's time goes into the system's headers, so sources with the same flags are checked several at a time:
-// a batch is a file that includes them all. Sources that define a name in common at namespace scope never share a batch.
+// a batch is a file that includes them all. Sources whose own names would clash never share a batch.
 // A source that passed is not checked again until it, a header of ours that it includes, its flags, .clang-tidy or
 // clang-tidy itself change.
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
-import { resolve } from "node:path";
+import { basename, resolve } from "node:path";
 import {
   contentOf,
   digest,
@@ -18,14 +18,15 @@ import {
 } from "../support/process.mjs";
 
 const tool = "clang-tidy-14";
-const batchSize = 8;
-/** Tests are asked for their names and little else: the expression templates of their assertions are dear to analyse. */
-const testChecks = [
-  "-*",
-  "readability-identifier-naming",
-  "google-build-using-namespace",
-  "performance-for-range-copy",
-].join(",");
+const batchSize = 32;
+/** A batch includes sources, and that alone is no finding. */
+const sourceChecks = "-bugprone-suspicious-include";
+/**
+ * Tests are asked for their names and little else: the expression templates of their assertions are dear to analyse, and they
+ * open the namespaces that they test.
+ */
+const testChecks = "-*,readability-identifier-naming,performance-for-range-copy";
+const checksFor = (path) => (path.startsWith("tests/") ? testChecks : sourceChecks);
 const cache = resolve(root, "build/checks/tidy");
 
 /** The compiler's flags per source, from the release build: everything but the compiler, -o, -c and the file. */
@@ -47,53 +48,95 @@ export function compileFlags() {
   return flags;
 }
 
-/** Names that a source defines at namespace scope, where clang-format puts definitions into the first column. */
+/** Per source to check, what the checks see of its flags: macros, search paths, language, machine. */
+async function sourcesWithFlags() {
+  const flags = compileFlags();
+  const compiled = [...flags.keys()];
+  const found = new Map();
+  for (const path of await trackedFiles(/\.(cpp|inc)$/)) {
+    // A kernel takes the flags of its plainest copy.
+    const copy = `/kernels/${basename(path, ".inc")}_simd_base.cpp`;
+    const words = flags.get(path.endsWith(".inc") ? compiled.find((file) => file.endsWith(copy)) : path);
+    if (!words) continue;
+    found.set(
+      path,
+      words.filter((word, i) => /^-(D|I|isystem|std=|m)/.test(word) || words[i - 1] === "-isystem"),
+    );
+  }
+  return found;
+}
+
+const definitions = new Map();
+/**
+ * Names that a file defines at namespace scope, where clang-format puts definitions into the first column: all of them, and
+ * its own (in an unnamed namespace or in none). Members of classes, `Type::name`, are not among them.
+ */
 function namesDefined(path) {
-  const names = new Set();
+  if (definitions.has(path)) return definitions.get(path);
+  const all = new Set();
+  const own = new Set();
+  const named = []; // per open namespace, whether it has a name
   for (const line of contentOf(path).split("\n")) {
+    const opened = line.match(/^namespace ?([\w:]*) ?\{$/);
+    if (opened) named.push(opened[1] !== "");
+    else if (/^\} {2}\/\/ namespace/.test(line)) named.pop();
     if (
       !/^[A-Za-z_]/.test(line) ||
       /^(namespace|using namespace|return|public|private|TEST_CASE)\b/.test(line)
     )
       continue;
-    for (const [, name] of line.matchAll(/\b([A-Za-z_]\w*)\s*(?=[({=;[]|$)/g)) names.add(name);
+    for (const [, name] of line.matchAll(/(?<!::)\b([A-Za-z_]\w*)\s*(?=[({=;[]|$)/g)) {
+      all.add(name);
+      if (named.length === 0 || named.includes(false)) own.add(name);
+    }
   }
-  return names;
+  definitions.set(path, { all, own });
+  return definitions.get(path);
 }
 
+/** A source's own names, and every name of the project that it sees. */
+function namesOf(path) {
+  const seen = withProjectIncludes(path).flatMap((part) => [...namesDefined(part).all]);
+  return { own: namesDefined(path).own, seen: new Set(seen) };
+}
+
+const meet = (a, b) => [...a].some((name) => b.has(name));
+const clash = (a, b) => meet(a.own, b.seen) || meet(b.own, a.seen);
+
+/** Sources in batches, those that take longest first: tests are asked for less. */
 function batches(sources, flags) {
   const all = [];
   // As many batches as there are processors, at least: two half batches in parallel beat a whole one alone.
   const size = Math.max(1, Math.min(batchSize, Math.ceil(sources.length / jobs)));
+  // Our own macros mean the same in every source that is given them.
+  const isOurs = (word) => word.startsWith("-DPOINTWRIGHT_");
   for (const path of sources) {
-    const key = [path.startsWith("tests/") ? `--checks=${testChecks}` : "--quiet", ...flags.get(path)].join(
-      " ",
+    const words = flags.get(path);
+    const key = JSON.stringify([checksFor(path), ...words.filter((word) => !isOurs(word))]);
+    const names = namesOf(path);
+    let batch = all.find(
+      ({ key: other, paths, names: others }) =>
+        key === other && paths.length < size && !others.some((some) => clash(names, some)),
     );
-    const names = namesDefined(path);
-    const fits = (batch) =>
-      batch.key === key && batch.paths.length < size && ![...names].some((name) => batch.names.has(name));
-    let batch = all.find(fits);
     if (!batch) {
-      batch = { key, paths: [], names: new Set() };
+      batch = { key, paths: [], names: [], checks: checksFor(path), flags: words };
       all.push(batch);
     }
     batch.paths.push(path);
-    for (const name of names) batch.names.add(name);
+    batch.names.push(names);
+    batch.flags = [...batch.flags, ...words.filter((word) => isOurs(word) && !batch.flags.includes(word))];
   }
-  return all;
+  const cost = ({ paths }) => paths.length * (paths[0].startsWith("tests/") ? 1 : 3);
+  return all.sort((a, b) => cost(b) - cost(a));
 }
 
-async function check({ paths, key }) {
+/** Outcomes of a batch: one, or those of its halves where the sources do not compile together (a clash that the names did not show). */
+async function check({ paths, checks, flags }) {
   const unit = resolve(cache, `${digest(...paths)}.cpp`);
-  writeFileSync(unit, paths.map((path) => `#include "${path}"\n`).join(""));
-  const [option, ...flags] = key.split(" ").filter((flag) => flag !== "-Werror");
-  const { status, output } = await run(
-    tool,
-    ["--quiet", option, unit, "--", ...flags, "-Wno-unknown-warning-option"],
-    {
-      cwd: resolve(root, "build/release"),
-    },
-  );
+  writeFileSync(unit, paths.map((path) => `#include "${resolve(root, path)}"\n`).join(""));
+  const { status, output } = await run(tool, ["--quiet", `--checks=${checks}`, unit, "--", ...flags, "-w"], {
+    cwd: resolve(root, "build/release"),
+  });
   const text = output
     .split("\n")
     .filter(
@@ -104,21 +147,26 @@ async function check({ paths, key }) {
     )
     .join("\n")
     .replaceAll(`${root}/`, "");
-  return { status, text };
+  if (paths.length === 1 || !text.includes("clang-diagnostic-error")) return [{ paths, status, text }];
+  const middle = Math.ceil(paths.length / 2);
+  return [
+    ...(await check({ paths: paths.slice(0, middle), checks, flags })),
+    ...(await check({ paths: paths.slice(middle), checks, flags })),
+  ];
 }
 
 export async function tidy() {
   mkdirSync(cache, { recursive: true });
-  const flags = compileFlags();
+  const flags = await sourcesWithFlags();
   const version = (await run(tool, ["--version"])).output;
   const config = contentOf(".clang-tidy");
-  const sources = (await trackedFiles(/\.cpp$/)).filter((path) => flags.has(path));
+  const sources = [...flags.keys()];
   const stamps = new Map(
     sources.map((path) => {
       const texts = withProjectIncludes(path).map(contentOf);
       return [
         path,
-        resolve(cache, `${digest(version, config, testChecks, flags.get(path).join(" "), ...texts)}.ok`),
+        resolve(cache, `${digest(version, config, checksFor(path), ...flags.get(path), ...texts)}.ok`),
       ];
     }),
   );
@@ -126,14 +174,7 @@ export async function tidy() {
 
   const complaints = new Set();
   await inParallel(batches(due, flags), async (batch) => {
-    let outcomes = [{ paths: batch.paths, ...(await check(batch)) }];
-    // Sources that do not compile together (a clash that the names did not show) are checked one by one.
-    if (batch.paths.length > 1 && outcomes[0].text.includes("clang-diagnostic-error")) {
-      outcomes = [];
-      for (const path of batch.paths)
-        outcomes.push({ paths: [path], ...(await check({ paths: [path], key: batch.key })) });
-    }
-    for (const { paths, status, text } of outcomes) {
+    for (const { paths, status, text } of await check(batch)) {
       if (status !== 0) complaints.add(text.trim());
       for (const path of paths) {
         const clean = status === 0 || !withProjectIncludes(path).some((part) => text.includes(`${part}:`));
