@@ -108,8 +108,9 @@ void Session::finish_building(Result<Hierarchy> built) {
   document.zero.operations = document.one.operations = no_operations;
   document.edits = std::make_shared<const EditList>();
   context_.begin_phase("ready", 1.0);
+  // The picture first: whoever sees that the session is ready gets a frame of it.
+  display_.publish(picture_of(document, document.surface, nullptr, 0));
   publish(std::move(document));
-  show_committed();
 }
 
 void Session::publish(Document document) {
@@ -191,21 +192,21 @@ Outcome<SharedDocument> Session::ready_document() const {
   return now;
 }
 
-Picture Session::picture_of(const SurfaceState& state, SharedField field, std::uint64_t sequence) const {
-  const SharedDocument now = document();
+Picture Session::picture_of(const Document& now, const SurfaceState& state, SharedField field,
+                            std::uint64_t sequence) const {
   return {.surface = state.surface,
           .field = std::move(field),
-          .marks = now->marks,
+          .marks = now.marks,
           .splat_radius = rest_.splat_radius,
           .detail_range = detail_range_of(state),
-          .revision = now->revision,
+          .revision = now.revision,
           .sequence = sequence};
 }
 
 void Session::show_committed() {
   const SharedDocument now = document();
   shows_preview_ = false;
-  display_.publish(picture_of(now->surface, shown_field_, 0));
+  display_.publish(picture_of(*now, now->surface, shown_field_, 0));
   feed_.notify();
 }
 
@@ -327,7 +328,7 @@ void Session::run_preview() {
   const auto after = compute(request->edit);
   if (!after.ok()) return;  // the regions were repainted meanwhile: the next preview is told so
   shows_preview_ = true;
-  display_.publish(picture_of(after.value(), shown_field_, request->sequence));
+  display_.publish(picture_of(*document(), after.value(), shown_field_, request->sequence));
   note_time("preview", begin);
   feed_.notify();
 }
@@ -343,7 +344,7 @@ Outcome<SharedFrame> Session::render_preview(const protocol::PreviewRequest& req
       return protocol::to_problem(valid.error());
     const auto after = compute(request.edit);
     if (!after.ok()) return after.problem();
-    const Picture picture = picture_of(after.value(), field_, request.sequence);
+    const Picture picture = picture_of(*now, after.value(), field_, request.sequence);
     const auto finest = static_cast<std::uint32_t>(picture.surface->band_count());
     return encode_picture(display_.layout(), picture, *params_.cloud, finest, attributes);
   });

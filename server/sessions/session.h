@@ -117,7 +117,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void fail(protocol::Problem problem);  // while building
   void publish(Document document);
   /// What viewers see of a state: the committed one, or a preview's (sequence > 0).
-  [[nodiscard]] Picture picture_of(const SurfaceState& state, SharedField field,
+  [[nodiscard]] Picture picture_of(const Document& now, const SurfaceState& state, SharedField field,
                                    std::uint64_t sequence) const;
   void show_committed();
   void run_preview();

@@ -163,7 +163,8 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
       if (made.ok()) field = made.value();  // without usable regions t is 0 everywhere
       show_field();
     }
-    return picture_of(document()->surface, std::move(field), 0);
+    const SharedDocument now = document();
+    return picture_of(*now, now->surface, std::move(field), 0);
   });
 }
 
