@@ -27,7 +27,7 @@ function flagsFor(header, flags) {
 
 export async function headers() {
   mkdirSync(cache, { recursive: true });
-  const flags = compileFlags();
+  const flags = await compileFlags();
   const version = (await run("g++", ["--version"])).output;
   const complaints = [];
   const firstIncludes = new Set(

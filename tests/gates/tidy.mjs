@@ -30,11 +30,15 @@ const checksFor = (path) => (path.startsWith("tests/") ? testChecks : sourceChec
 const cache = resolve(root, "build/checks/tidy");
 
 /** The compiler's flags per source, from the release build: everything but the compiler, -o, -c and the file. */
-export function compileFlags() {
+export async function compileFlags() {
+  const commands = resolve(root, "build/release/compile_commands.json");
+  if (!existsSync(commands)) {
+    const configured = await run("cmake", ["--preset", "release"]);
+    if (configured.status !== 0)
+      throw new Error(`the release build cannot be configured:\n${configured.output}`);
+  }
   const flags = new Map();
-  for (const { file, command } of JSON.parse(
-    readFileSync(resolve(root, "build/release/compile_commands.json"), "utf8"),
-  )) {
+  for (const { file, command } of JSON.parse(readFileSync(commands, "utf8"))) {
     // The commands are written for a shell: a definition's quotes come with backslashes.
     const words = command
       .split(" ")
@@ -50,7 +54,7 @@ export function compileFlags() {
 
 /** Per source to check, what the checks see of its flags: macros, search paths, language, machine. */
 async function sourcesWithFlags() {
-  const flags = compileFlags();
+  const flags = await compileFlags();
   const compiled = [...flags.keys()];
   const found = new Map();
   for (const path of await trackedFiles(/\.(cpp|inc)$/)) {

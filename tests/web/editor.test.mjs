@@ -62,6 +62,15 @@ async function project(page, x, y) {
   return [0.5 + (x * perUnit) / width, 0.5 - (y * perUnit) / height];
 }
 
+/** Waits until the condition holds. */
+async function until(holds, what) {
+  const ends = Date.now() + waitMs;
+  while (!(await holds())) {
+    assert.ok(Date.now() < ends, what);
+    await new Promise((done) => setTimeout(done, 200));
+  }
+}
+
 /** Paints the left cap zero and the right cap one, through the API. */
 async function paintCaps(session, page) {
   const url = (region) => `${service.url}/v1/sessions/${session.id}/regions/${region}/operations`;
@@ -292,14 +301,34 @@ test("a link carries the camera and the display", { timeout }, async () => {
   await second.page.close();
 });
 
-test("the base level can be shown and left again", { timeout }, async () => {
-  const { page, close } = await openEditor();
+test("the base level shows another surface, follows what others paint and edit, and is left again", {
+  timeout,
+}, async () => {
+  const { page, session, edits, close } = await openEditor();
+  const picture = () => page.locator("canvas.viewport-canvas").screenshot({ timeout: waitMs });
+  const full = await picture();
   await page.getByLabel("Level").selectOption("0");
-  await page.waitForTimeout(500);
   await waitForIdle(page, waitMs);
   assert.ok((await countPixels(page)).surface > 3000);
+  assert.ok(!full.equals(await picture()), "the base is smoother than the full surface");
+  await paintCaps(session, page);
+  await until(async () => (await countPixels(page)).blue > 500, "the others' painting shows on the base");
+
+  const edit = { level: 0, deformation: { type: "translation", vector: [0, 1, 0] } };
+  const { revision } = await json(`${service.url}/v1/sessions/${session.id}`);
+  const answer = await fetch(`${service.url}/v1/sessions/${session.id}/edits`, {
+    method: "POST",
+    headers: { "Content-Type": "application/json", "If-Match": `"r${revision}"` },
+    body: JSON.stringify(edit),
+  });
+  assert.equal(answer.status, 201);
+  await waitForRevision(page, revision + 1);
+  await page.locator(".history-entry").nth(1).waitFor({ timeout: waitMs });
+  await page.getByRole("button", { name: "Undo" }).click();
+  await waitForRevision(page, revision + 2);
+  assert.equal((await edits()).head, 0);
+
   await page.getByLabel("Level").selectOption("full");
-  await page.waitForTimeout(500);
   await waitForIdle(page, waitMs);
   assert.ok((await countPixels(page)).surface > 3000);
   await close();

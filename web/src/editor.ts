@@ -2,7 +2,6 @@ import type { ApiClient } from "./api/client";
 import type { SessionDocument } from "./api/types";
 import { CommandQueue } from "./command-queue";
 import { editorShortcuts } from "./editor-shortcuts";
-import { reportError } from "./edits/errors";
 import { HistoryEditor } from "./edits/history";
 import { RegionEditor } from "./edits/regions";
 import { TransformEditor } from "./edits/transform";
@@ -150,7 +149,7 @@ export function createEditor(
   });
   keepLink(viewport);
   source.start();
-  void history.load().catch((error: unknown) => reportError(bus, error, "The history cannot be read"));
+  void history.load();
   return { viewport, source, store, queue, loaded: () => loaded };
 }
 

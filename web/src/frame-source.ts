@@ -14,7 +14,7 @@ const TELL_MS = 80;
  * Where the picture's samples come from: the session's stream, or one frame of a coarser level. Each block goes to the GPU
  * as it comes.
  */
-export class FrameSource implements StreamSink {
+export class FrameSource {
   /** What the screen last showed whole. */
   last: FrameHeader | null = null;
 
@@ -26,6 +26,9 @@ export class FrameSource implements StreamSink {
   private readonly onFirst_: (header: FrameHeader) => void;
   private level_: number | null = null;
   private abort_ = new AbortController();
+  private loading_ = false;
+  /** Of the stream's frames while a level is shown. */
+  private newest_ = -1;
   private told_ = 0;
 
   constructor(
@@ -40,7 +43,15 @@ export class FrameSource implements StreamSink {
     this.store_ = store;
     this.viewport_ = viewport;
     this.onFirst_ = onFirst;
-    this.stream_ = new SessionStream(client, store.id, this, {
+    // While a coarser level is shown, the stream's frames say only that there is something new to load.
+    const sink: StreamSink = {
+      frameBegin: (header) => this.level_ === null && this.frameBegin(header),
+      frameBlock: (block, header) => this.level_ === null && this.frameBlock(block, header),
+      frameEnd: (header) =>
+        this.level_ === null ? this.frameEnd(header) : this.refreshLevel(header.revision),
+      event: (event) => this.event(event),
+    };
+    this.stream_ = new SessionStream(client, store.id, sink, {
       onState: (state) => bus.fire("connection.changed", state),
       mayRetry: (error) => {
         const status = error instanceof ApiError ? error.status : 0;
@@ -69,12 +80,8 @@ export class FrameSource implements StreamSink {
     this.level_ = level;
     this.abort_.abort();
     if (this.last) this.tellLoad(this.last, false);
-    if (level === null) {
-      this.stream_.start();
-    } else {
-      this.stream_.stop();
-      void this.loadLevel(level);
-    }
+    if (level === null) this.stream_.start();
+    else void this.loadLevel(level);
   }
 
   stop(): void {
@@ -82,7 +89,7 @@ export class FrameSource implements StreamSink {
     this.abort_.abort();
   }
 
-  frameBegin(header: FrameHeader): void {
+  private frameBegin(header: FrameHeader): void {
     const key = header.kind === "key";
     this.viewport_.beginFrame(
       {
@@ -104,7 +111,7 @@ export class FrameSource implements StreamSink {
     if (key) this.tellLoad(header, false);
   }
 
-  frameBlock(block: FrameBlock, header: FrameHeader): void {
+  private frameBlock(block: FrameBlock, header: FrameHeader): void {
     this.viewport_.putBlock({
       index: block.number,
       count: block.count,
@@ -120,7 +127,7 @@ export class FrameSource implements StreamSink {
     if (header.kind === "key" && performance.now() - this.told_ > TELL_MS) this.tellLoad(header, false);
   }
 
-  frameEnd(header: FrameHeader): void {
+  private frameEnd(header: FrameHeader): void {
     this.last = header;
     const { sequence, revision } = header;
     this.tellLoad(header, true);
@@ -128,7 +135,7 @@ export class FrameSource implements StreamSink {
     this.bus_.fire("frame.applied", { sequence, revision, key: header.kind === "key" });
   }
 
-  event(event: StreamEvent): void {
+  private event(event: StreamEvent): void {
     if (event.event !== "session") return;
     const { event: _, ...document } = event;
     this.store_.update(document);
@@ -143,10 +150,19 @@ export class FrameSource implements StreamSink {
     });
   }
 
+  /** Loads the level that is shown again, once the session has moved on; one load at a time. */
+  private refreshLevel(revision: number): void {
+    this.newest_ = Math.max(this.newest_, revision);
+    if (this.level_ !== null && !this.loading_ && this.newest_ > (this.last?.revision ?? -1))
+      void this.loadLevel(this.level_);
+  }
+
   /** One frame by itself, as a response body. */
   private async loadLevel(level: number): Promise<void> {
-    this.abort_ = new AbortController();
-    const { signal } = this.abort_;
+    const abort = new AbortController();
+    const { signal } = abort;
+    this.abort_ = abort;
+    this.loading_ = true;
     try {
       const response = await this.client_.frame(this.store_.id, level, signal);
       const bytes = new Uint8Array(await response.arrayBuffer());
@@ -163,6 +179,12 @@ export class FrameSource implements StreamSink {
       this.frameEnd(header);
     } catch (error) {
       if (!signal.aborted) reportError(this.bus_, error, "This level could not be shown");
+      this.newest_ = -1;
+    } finally {
+      if (this.abort_ === abort) {
+        this.loading_ = false;
+        this.refreshLevel(-1);
+      }
     }
   }
 }

@@ -138,8 +138,8 @@ export class ApiClient {
     return this.json(`v1/sessions/${id}/edits`);
   }
 
-  putHead(id: string, edit: number): Promise<SessionDocument> {
-    return this.send("PUT", `v1/sessions/${id}/head`, { edit });
+  putHead(id: string, edit: number, revision: number): Promise<SessionDocument> {
+    return this.send("PUT", `v1/sessions/${id}/head`, { edit }, { "If-Match": `"r${revision}"` });
   }
 
   exportUrl(id: string, format: ExportFormat): string {

@@ -1,49 +1,62 @@
 import type { ApiClient } from "../api/client";
-import type { History } from "../api/types";
+import { problemOf } from "../api/problem";
 import type { CommandQueue } from "../command-queue";
 import type { Bus, SessionStore } from "../session-store";
-import { reportError } from "./errors";
+import { reportChangedMeanwhile, reportError } from "./errors";
 
-/** Undo, redo and jumps: the server's head is the truth, the list here is its copy. */
+/** Undo, redo and jumps: the server's head is the truth. The list that is shown follows every change, whoever makes it. */
 export class HistoryEditor {
   private readonly bus_: Bus;
   private readonly client_: ApiClient;
   private readonly queue_: CommandQueue;
   private readonly store_: SessionStore;
-  private history_: History = { head: 0, edits: [] };
+  private loading_ = false;
+  private stale_ = false;
 
   constructor(bus: Bus, client: ApiClient, queue: CommandQueue, store: SessionStore) {
     this.bus_ = bus;
     this.client_ = client;
     this.queue_ = queue;
     this.store_ = store;
-    bus.on("history.changed", (history) => {
-      this.history_ = history;
-    });
+    bus.on("session.changed", () => void this.load());
     bus.function("edit.undo", () => this.step(-1));
     bus.function("edit.redo", () => this.step(1));
     bus.function("edit.jump", (edit) => this.jump(() => edit));
   }
 
+  /** Fetches the list; while an answer is awaited, further calls ask for one more. */
   async load(): Promise<void> {
-    this.bus_.fire("history.changed", await this.client_.history(this.store_.id));
+    this.stale_ = true;
+    if (this.loading_) return;
+    this.loading_ = true;
+    try {
+      while (this.stale_) {
+        this.stale_ = false;
+        this.bus_.fire("history.changed", await this.client_.history(this.store_.id));
+      }
+    } catch (error) {
+      reportError(this.bus_, error, "The history cannot be read");
+    } finally {
+      this.loading_ = false;
+    }
   }
 
   private step(by: number): Promise<void> {
     // Resolved when its turn comes, so that two quick presses undo two edits.
-    return this.jump(() => this.history_.head + by);
+    return this.jump(() => this.store_.document.history.head + by);
   }
 
   private async jump(target: () => number): Promise<void> {
     try {
       await this.queue_.enqueue(async () => {
+        const { history, revision } = this.store_.document;
         const edit = target();
-        if (edit < 0 || edit > this.history_.edits.length || edit === this.history_.head) return;
-        this.store_.update(await this.client_.putHead(this.store_.id, edit));
-        await this.load();
+        if (edit < 0 || edit > history.edits || edit === history.head) return;
+        this.store_.update(await this.client_.putHead(this.store_.id, edit, revision));
       });
     } catch (error) {
-      reportError(this.bus_, error, "The history could not be moved");
+      if (problemOf(error).status === 412) await reportChangedMeanwhile(this.bus_, this.client_, this.store_);
+      else reportError(this.bus_, error, "The history could not be moved");
     }
   }
 }

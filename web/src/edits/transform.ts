@@ -6,7 +6,7 @@ import type { TransformState } from "../event-map";
 import type { Vec3 } from "../math/vec3";
 import type { Bus, SessionStore } from "../session-store";
 import { deformationFault, describeDeformation, isIdentity } from "./deformation";
-import { reportError } from "./errors";
+import { reportChangedMeanwhile, reportError } from "./errors";
 import { PreviewSender } from "./preview";
 
 function obstacleOf(session: SessionDocument): string | null {
@@ -143,7 +143,6 @@ export class TransformEditor {
         await this.client_.commitEdit(this.store_.id, this.body(deformation), revision);
         this.settle();
         this.store_.update(await this.client_.session(this.store_.id));
-        this.bus_.fire("history.changed", await this.client_.history(this.store_.id));
         this.bus_.fire("toast", { kind: "success", title: describeDeformation(deformation) });
       } catch (error) {
         await this.failed(error);
@@ -158,13 +157,7 @@ export class TransformEditor {
       reportError(this.bus_, error, "The edit was not recorded");
       return;
     }
-    this.store_.update(await this.client_.session(this.store_.id));
-    this.bus_.fire("history.changed", await this.client_.history(this.store_.id));
-    this.bus_.fire("toast", {
-      kind: "error",
-      title: "The session has changed meanwhile",
-      lines: ["Someone else painted or edited. Look at the new state, then apply again."],
-    });
+    await reportChangedMeanwhile(this.bus_, this.client_, this.store_);
   }
 
   private settle(): void {
