@@ -24,6 +24,7 @@ Service::Service(Config settings, ServiceParts parts)
       sessions(config.limits,
                {.interactive = interactive, .background = background, .build = std::move(parts.build)}),
       upload_memory(config.limits.max_upload_memory),
+      json_memory(config.limits.max_json_memory),
       streams(config.limits.max_streams) {}
 
 Response json_response(const protocol::JsonDocument& document, int status) {

@@ -39,7 +39,8 @@ class Service {
   ComputePool background;   ///< what lasts for seconds: building, exporting
   CloudStore clouds;
   SessionStore sessions;
-  Budget upload_memory;
+  Budget upload_memory;  ///< of clouds that are received or decoded
+  Budget json_memory;    ///< of documents
   Budget streams;
   std::atomic<bool> stopping{false};
 };

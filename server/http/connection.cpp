@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t kLingerDropBytes = 256 * 1024;
 constexpr std::size_t kReadBytes = 64 * 1024;
+constexpr std::uint64_t kHoldBytes = 4U << 20U;
 
 int poll_timeout(Clock::time_point deadline) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
@@ -84,19 +85,33 @@ Connection::HeadStatus Connection::read_head(std::size_t max_bytes, Clock::time_
   }
 }
 
-Connection::BodyStatus Connection::read_body(std::uint64_t length, Clock::time_point deadline,
+Connection::BodyStatus Connection::read_body(std::uint64_t length, BodyPace pace,
+                                             const std::function<bool(std::uint64_t)>& hold,
                                              std::string& body) {
   body = pending_.substr(0, static_cast<std::size_t>(std::min<std::uint64_t>(length, pending_.size())));
   pending_.clear();
+  std::uint64_t held = 0;
+  Clock::time_point deadline = Clock::now() + pace.grace;
   while (body.size() < length) {
     if (Clock::now() >= deadline) return BodyStatus::kTimedOut;
     const std::size_t before = body.size();
+    // Small pieces first: who announces much and sends nothing holds next to nothing.
+    while (held < std::min<std::uint64_t>(length, before + kReadBytes)) {
+      const std::uint64_t more =
+          std::min(length - held, std::clamp<std::uint64_t>(held, kReadBytes, kHoldBytes));
+      if (!hold(more)) return BodyStatus::kNoRoom;
+      held += more;
+    }
     const auto left = static_cast<std::size_t>(length - before);
     body.resize(before + std::min(left, kReadBytes));
     const std::ptrdiff_t count = receive(body.data() + before, body.size() - before, deadline);
     body.resize(before + static_cast<std::size_t>(std::max<std::ptrdiff_t>(count, 0)));
     if (count < 0) return BodyStatus::kTimedOut;
     if (count == 0) return BodyStatus::kClosed;
+    // What came buys time at the least rate, but never more than the grace: nobody saves up for a pause.
+    const std::chrono::nanoseconds bought(static_cast<std::uint64_t>(count) * 1'000'000'000U /
+                                          pace.least_rate);
+    deadline = std::min(deadline + bought, Clock::now() + pace.grace);
   }
   return BodyStatus::kComplete;
 }

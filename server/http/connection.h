@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,9 +26,16 @@ class Connection {
   /// Never holds more than max_bytes (+ one read) and never waits beyond the deadline.
   HeadStatus read_head(std::size_t max_bytes, Clock::time_point deadline, std::string& head);
 
-  enum class BodyStatus { kComplete, kClosed, kTimedOut };
+  /// How fast a body must come: any silence is at most the grace, and beyond it the bytes make the rate.
+  struct BodyPace {
+    std::chrono::milliseconds grace;
+    std::uint64_t least_rate = 1;  ///< bytes a second
+  };
+  enum class BodyStatus { kComplete, kClosed, kTimedOut, kNoRoom };
   /// Reads exactly `length` bytes of body into `body` (reserved as it arrives, not as it is announced).
-  BodyStatus read_body(std::uint64_t length, Clock::time_point deadline, std::string& body);
+  /// `hold` is asked for room piece by piece, before the bytes are read; where it has none, reading ends.
+  BodyStatus read_body(std::uint64_t length, BodyPace pace, const std::function<bool(std::uint64_t)>& hold,
+                       std::string& body);
 
   /// Writes everything before the deadline. False: the peer is gone or too slow; the connection is then
   /// broken.

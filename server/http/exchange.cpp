@@ -124,20 +124,29 @@ std::optional<Problem> Exchange::check_body(const BodyPolicy& policy) const {
   return std::nullopt;
 }
 
-std::optional<Problem> Exchange::read_body(const BodyPolicy& policy, std::string& body) {
-  if (policy.kind == BodyPolicy::Kind::kNone) return std::nullopt;
+std::optional<Problem> Exchange::read_body(const Endpoint& endpoint, std::string& body) {
+  if (endpoint.body.kind == BodyPolicy::Kind::kNone) return std::nullopt;
   const RequestHead& head = std::get<RequestHead>(head_);
   const std::uint64_t length = head.content_length.value_or(0);
   const HttpOptions& options = context_.options;
   if (head.header("expect") && length > 0)
     connection_.write_all(std::string_view("HTTP/1.1 100 Continue\r\n\r\n"),
                           Clock::now() + options.write_grace);
-  const auto deadline = Clock::now() + options.body_grace + time_for(length, options.least_body_rate);
-  const auto status = connection_.read_body(length, deadline, body);
+  const auto hold = [&](std::uint64_t bytes) {
+    if (endpoint.body_memory == nullptr) return true;
+    body_memory_.push_back(endpoint.body_memory->hold(bytes));
+    return body_memory_.back() != nullptr;
+  };
+  const auto status = connection_.read_body(
+      length, {.grace = options.body_grace, .least_rate = options.least_body_rate}, hold, body);
   log_.request_bytes += body.size();
   if (status == Connection::BodyStatus::kComplete) return std::nullopt;
   if (status == Connection::BodyStatus::kTimedOut)
     return Problem{.kind = ProblemKind::kRequestTimeout, .detail = "the body came too slowly"};
+  if (status == Connection::BodyStatus::kNoRoom)
+    return Problem{.kind = ProblemKind::kOverloaded,
+                   .detail = "other requests take the memory for bodies",
+                   .limit = static_cast<double>(endpoint.body_memory->total())};
   return Problem{.kind = ProblemKind::kMalformedRequest,
                  .detail = "the body ended before its Content-Length",
                  .limit = std::nullopt,
@@ -160,7 +169,7 @@ Response Exchange::dispatch() {
   log_.route = endpoint.route;
   if (auto problem = check_body(endpoint.body)) return refuse(*problem);
   Request request{.head = head, .id = request_id_, .captures = std::move(endpoint.captures), .body = {}};
-  if (auto problem = read_body(endpoint.body, request.body)) return refuse(*problem);
+  if (auto problem = read_body(endpoint, request.body)) return refuse(*problem);
   return endpoint.handle(request);
 }
 
@@ -168,6 +177,7 @@ Response Exchange::answer() {
   Response response;
   try {
     response = dispatch();
+    body_memory_.clear();
   } catch (const std::bad_alloc&) {
     note_failure("out of memory");
     response = refuse(

@@ -4,8 +4,10 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "server/http/connection.h"
 #include "server/http/http_server.h"
@@ -53,7 +55,7 @@ class Exchange {
   Response dispatch();
   Response refuse(const Problem& problem);
   std::optional<Problem> check_body(const BodyPolicy& policy) const;
-  std::optional<Problem> read_body(const BodyPolicy& policy, std::string& body);
+  std::optional<Problem> read_body(const Endpoint& endpoint, std::string& body);
 
   const ExchangeContext& context_;
   Connection& connection_;
@@ -63,6 +65,7 @@ class Exchange {
   std::variant<RequestHead, Problem> head_;
   std::string request_id_;
   RequestLog log_;
+  std::vector<std::shared_ptr<void>> body_memory_;  // until the answer is made
 };
 
 }  // namespace pointwright::server

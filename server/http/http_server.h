@@ -20,10 +20,10 @@ struct HttpOptions {
   std::vector<std::string> allowed_hosts;
   HeadLimits head;
   std::chrono::milliseconds head_deadline{5000};
-  std::chrono::milliseconds body_grace{
-      10'000};  ///< a body may take this long, plus its length at the least rate
-  std::uint64_t least_body_rate = 64 * 1024;      ///< bytes a second
-  std::chrono::milliseconds write_grace{20'000};  ///< the same for answers
+  std::chrono::milliseconds body_grace{10'000};  ///< a body may pause this long, and then owes the least rate
+  std::uint64_t least_body_rate = 64 * 1024;     ///< bytes a second
+  /// An answer may take this long, plus its length at the least rate.
+  std::chrono::milliseconds write_grace{20'000};
   std::uint64_t least_write_rate = 64 * 1024;
   std::chrono::milliseconds stream_write_deadline{20'000};  ///< for each write of a streamed body
   std::size_t max_connections = 1024;

@@ -13,6 +13,8 @@
 #include <variant>
 #include <vector>
 
+#include "server/base/budget.h"
+
 namespace pointwright::server {
 
 enum class Method { kGet, kHead, kPost, kPut, kPatch, kDelete, kOptions };
@@ -96,8 +98,8 @@ struct Endpoint {
   std::string route;  ///< the pattern, for logs
   std::vector<std::string> captures;
   std::function<Response(const Request&)> handle;
-  /// What the request keeps from others (memory for its body) until it is answered.
-  std::shared_ptr<void> hold = {};
+  /// What the bytes of the body are held from as they arrive, until the request is answered; null: nothing.
+  Budget* body_memory = nullptr;
 };
 using Resolution = std::variant<Response, Endpoint>;
 

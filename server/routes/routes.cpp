@@ -66,20 +66,22 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
   return {};
 }
 
-/// Holds memory for a body before it is read. One over its limit is not held for: the fence refuses it.
-Outcome<std::shared_ptr<void>> admit_body(Service& service, const BodyPolicy& policy,
-                                          const RequestHead& head) {
+/// Where the bytes of a body are held from as they arrive. Documents have a reserve of their own, so that no
+/// upload keeps a hand waiting. A body for which there is no room now is refused before it is read; one over
+/// its limit is let through: the fence refuses it.
+Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const RequestHead& head) {
+  Budget& memory = policy.kind == Body::kCloud ? service.upload_memory : service.json_memory;
   const std::uint64_t length = head.content_length.value_or(0);
-  if (length > policy.max_bytes) return std::shared_ptr<void>();
+  if (length > policy.max_bytes) return &memory;
   if (policy.kind == Body::kCloud)
     if (auto room = service.clouds.check_room(); !room.ok()) return room.problem();
-  auto hold = service.upload_memory.hold(length);
-  if (hold == nullptr)
+  const std::uint64_t held = memory.held();
+  if (length > memory.total() - held)
     return Problem{.kind = ProblemKind::kOverloaded,
                    .detail = "other requests take the memory for bodies",
-                   .limit = static_cast<double>(service.upload_memory.total()),
-                   .actual = static_cast<double>(service.upload_memory.held() + length)};
-  return hold;
+                   .limit = static_cast<double>(memory.total()),
+                   .actual = static_cast<double>(held + length)};
+  return &memory;
 }
 
 Resolution endpoint_of(Service& service, const Route& route, std::vector<std::string> captures,
@@ -92,7 +94,7 @@ Resolution endpoint_of(Service& service, const Route& route, std::vector<std::st
   if (route.body != Body::kNone) {
     auto admitted = admit_body(service, endpoint.body, head);
     if (!admitted.ok()) return problem_response(admitted.problem(), head.path, request_id);
-    endpoint.hold = admitted.value();
+    endpoint.body_memory = admitted.value();
   }
   return endpoint;
 }

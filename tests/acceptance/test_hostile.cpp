@@ -161,6 +161,48 @@ TEST_CASE("slow, idle and unread connections do not keep an honest client waitin
   }
 }
 
+TEST_CASE("uploads that are announced and never sent take no room from others and end soon") {
+  Daemon daemon({"--body-grace-ms", "2000", "--least-body-rate", "1000000"});
+  const std::string session =
+      daemon.open_session(daemon.upload(file_of(wavy_sheet(20), CloudFormat::kPly)).json()["id"]);
+  const std::string head =
+      "POST /v1/clouds HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/x-ply\r\nContent-Length: "
+      "1073741824\r\n\r\n";
+  RawClient silent(daemon.port());
+  RawClient stalled(daemon.port());
+  const auto begin = std::chrono::steady_clock::now();
+  silent.send(head);
+  // What was sent fast does not pay for a pause later.
+  stalled.send(head + std::string(20'000'000, '0'));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  CHECK(daemon.ask("POST", session + "/regions/one/operations", R"({"mode":"add","shape":{"type":"all"}})")
+            .status == 200);
+  CHECK(daemon.upload(file_of(wavy_sheet(20), CloudFormat::kPly)).status == 201);
+  CHECK(parse_reply(silent.receive_all()).status == 408);
+  CHECK(parse_reply(stalled.receive_all()).status == 408);
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
+}
+
+TEST_CASE("uploads that fill the memory for uploads leave documents theirs") {
+  Daemon daemon({"--max-upload-memory", "1000000"});
+  const std::string session =
+      daemon.open_session(daemon.upload(file_of(wavy_sheet(20), CloudFormat::kPly)).json()["id"]);
+  const std::string head =
+      "POST /v1/clouds HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/x-ply\r\nContent-Length: "
+      "1000000\r\n\r\n";
+  RawClient first(daemon.port());
+  first.send(head + std::string(999'999, '0'));
+  Reply refused;
+  for (int i = 0; i < 100 && refused.status != 503; ++i) {
+    refused = daemon.upload(std::string(900'000, '0'), "text/plain");
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  CHECK(refused.status == 503);
+  CHECK(refused.headers.count("retry-after") == 1);
+  CHECK(daemon.ask("POST", session + "/regions/one/operations", R"({"mode":"add","shape":{"type":"all"}})")
+            .status == 200);
+}
+
 TEST_CASE("foreign hosts and origins are refused on every kind of request") {
   Daemon daemon;
   const Reply cloud = daemon.upload("0 0 0\n1 0 0\n0 1 0\n", "text/plain");
