@@ -49,15 +49,32 @@ class Quadrants {
   std::array<float, 4> nearest_{};
 };
 
+/// Calls see(sample) for the neighbours of i, for their neighbours, and so on, `rings` steps away.
+template <typename See>
+void for_each_in_ring(std::size_t i, int rings, const NeighborGraph& graph, const See& see) {
+  for (std::uint32_t j = 0; j < graph.k; ++j) {
+    const std::size_t neighbor = graph.index(i, j);
+    if (rings == 1)
+      see(neighbor);
+    else
+      for_each_in_ring(neighbor, rings - 1, graph, see);
+  }
+}
+
 float radius_of(std::size_t i, const Points& position, const Points& normal, const NeighborGraph& graph) {
   Quadrants quadrants(position[i], normal[i]);
-  for (std::uint32_t j = 0; j < graph.k; ++j) quadrants.see(position[graph.index(i, j)]);
-  if (quadrants.has_empty()) {
-    for (std::uint32_t j = 0; j < graph.k; ++j) {
-      const std::size_t neighbor = graph.index(i, j);
-      for (std::uint32_t m = 0; m < graph.k; ++m) quadrants.see(position[graph.index(neighbor, m)]);
-    }
-  }
+  // The disc of a sample that faces the other way closes nothing on this side of a thin sheet.
+  bool two_sided = false;
+  const auto see = [&](std::size_t sample) {
+    if (normal[sample].dot(normal[i]) > 0.0F)
+      quadrants.see(position[sample]);
+    else
+      two_sided = true;
+  };
+  for_each_in_ring(i, 1, graph, see);
+  if (quadrants.has_empty()) for_each_in_ring(i, 2, graph, see);
+  // Between two sides half of each ring is lost.
+  if (two_sided && quadrants.has_empty()) for_each_in_ring(i, 3, graph, see);
   const float farthest = (position[graph.index(i, graph.k - 1)] - position[i]).squaredNorm();
   return kCover * quadrants.gap(kRim * kRim * farthest);
 }

@@ -9,12 +9,13 @@
 namespace pointwright {
 
 /// Disc radii that close an unevenly sampled surface: 0.9 times the distance to the nearest neighbour in that
-/// quadrant of the tangent plane where it is farthest, looked for among the neighbours and, where a quadrant
-/// has none, among theirs. Past the rim of an open surface no neighbour is found: there half of the distance
-/// to the k-th one counts. At most three times the median of the neighbours' radii, so that outliers stay
-/// small; 0 where a sample has no neighbour elsewhere.
-/// Shapes:      N positions with unit normals, their graph
-/// Cost:        O(N k), and k^2 for samples with an empty quadrant; parallel
+/// quadrant of the tangent plane where it is farthest, looked for among the neighbours that face the same way
+/// and, where a quadrant has none, among theirs (and, on thin sheets, whose other side takes places in the
+/// graph, among those of theirs). Past the rim of an open surface no neighbour is found: there half of the
+/// distance to the k-th one counts. At most three times the median of the neighbours' radii, so that outliers
+/// stay small; 0 where a sample has no neighbour elsewhere.
+/// Shapes:      N positions with unit normals on consistent sides, their graph
+/// Cost:        O(N k), k^2 for samples with an empty quadrant, k^3 for those of thin sheets; parallel
 /// Determinism: bitwise equal for any thread count
 std::vector<float> splat_radii(const Points& position, const Points& normal, const NeighborGraph& graph);
 

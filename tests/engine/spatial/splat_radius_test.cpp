@@ -67,6 +67,30 @@ TEST_CASE("the discs of randomly sampled surfaces close them, at any density") {
   }
 }
 
+TEST_CASE("the discs of each side close a thin sheet, however near the other side lies") {
+  constexpr std::size_t kSide = 150;
+  for (const double gap : {0.1, 0.5, 1.0}) {
+    const Surface sheets = parallel_sheets(kSide, 1.0, gap, Sampling::kRandom, 7);
+    const auto radius = radii_of(sheets);
+    std::vector<Vec3f> top;
+    std::vector<float> top_radius;
+    for (std::size_t i = 0; i < sheets.size(); ++i) {
+      if (sheets.normal[i].z() < 0.0F) continue;
+      top.push_back(sheets.position[i]);
+      top_radius.push_back(radius[i]);
+    }
+    REQUIRE(top.size() == kSide * kSide);
+    // Inside, where no rim is near.
+    std::vector<Vec3f> places;
+    const Surface fine = plane(2 * (kSide - 12), 0.5, Sampling::kRegular);
+    for (std::size_t i = 0; i < fine.size(); ++i) {
+      places.push_back(fine.position[i] + Vec3f(0.0F, 0.0F, static_cast<float>(0.5 * gap)));
+    }
+    CHECK(uncovered({.position = from_list(top), .normal = {}}, top_radius, from_list(places)) < 1e-3);
+    CHECK(mean(top_radius) < 1.6);
+  }
+}
+
 TEST_CASE("an outlier gets no larger disc than three times the median around it") {
   const Surface ball = sphere(5'000, 1.0, Sampling::kRegular);
   const float usual = static_cast<float>(mean(radii_of(ball)));
