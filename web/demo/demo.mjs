@@ -4,6 +4,7 @@ import { spawn } from "node:child_process";
 import { mkdirSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { dirname, relative, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
+import { putBeside } from "./beside.mjs";
 import { startDaemon } from "./daemon.mjs";
 import { oneOperations, regionOf, turn, zeroOperations } from "./dragon.mjs";
 import { readPly } from "./ply.mjs";
@@ -206,6 +207,11 @@ async function tell(url) {
     return verify(readPly(original), readPly(edited), cloud.diagonal);
   });
   await step("picture: after", () => takePicture(url, session.id, "after.png", "shaded"));
+  await step("picture: both", async () => {
+    const file = resolve(out, "dragon.jpg");
+    await putBeside(resolve(out, "painted.png"), resolve(out, "after.png"), 1280 / 800, file);
+    return here(file);
+  });
 }
 
 async function main() {
