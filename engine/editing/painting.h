@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "engine/core/execution_context.h"
 #include "engine/core/points.h"
 #include "engine/core/result.h"
 #include "engine/editing/shape.h"
@@ -40,10 +41,16 @@ Result<void> validate(const PaintOperation& operation);
 
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
 /// Shapes:      positions relative to `origin`; normals of the same surface (read only for `facing`)
-/// Cost:        O(N) with an early bounding-box test per block; parallel
+/// Cost:        O(N), parallel over samples. A stroke of V vertices adds O(V log V) to sort its segments
+///              once, O(log V) for each range of kParallelBlock samples, and a test of each of a block's 128
+///              samples against the segments within the radius of that block. Long segments whose bounding
+///              boxes hold all samples are each tested once a range; where all of them pass through all
+///              blocks it is O(N V)
 /// Determinism: bitwise equal for any thread count
+/// Cancels:     between blocks of samples; the marks are then incomplete and must be dropped
 std::size_t paint(const PaintOperation& operation, RegionKind kind, const Points& position,
-                  const Points& normal, const Vec3d& origin, Marks& marks);
+                  const Points& normal, const Vec3d& origin, Marks& marks,
+                  const ExecutionContext* context = nullptr);
 
 /// Samples painted with `kind`. Cost: O(N).
 std::size_t count_marked(const Marks& marks, RegionKind kind);

@@ -130,7 +130,7 @@ bool contains(const Shape& shape, const Vec3d& point) {
   return std::visit([&](const auto& one) { return contains_one(one, point); }, shape);
 }
 
-bool stroke_segment_contains(const Stroke& stroke, std::size_t segment, const Vec3d& point) {
+double stroke_segment_distance_sq(const Stroke& stroke, std::size_t segment, const Vec3d& point) {
   const Vec3d& a = stroke.vertices[segment];
   const Vec3d& b = stroke.vertices[std::min(segment + 1, stroke.vertices.size() - 1)];
   const Vec3d along = b - a;
@@ -138,7 +138,11 @@ bool stroke_segment_contains(const Stroke& stroke, std::size_t segment, const Ve
   const double length_sq = along.squaredNorm();
   // A segment without length is the ball around its vertex.
   const double s = length_sq > 0.0 ? std::clamp(to_point.dot(along) / length_sq, 0.0, 1.0) : 0.0;
-  return (to_point - s * along).squaredNorm() <= stroke.radius * stroke.radius;
+  return (to_point - s * along).squaredNorm();
+}
+
+bool stroke_segment_contains(const Stroke& stroke, std::size_t segment, const Vec3d& point) {
+  return stroke_segment_distance_sq(stroke, segment, point) <= stroke.radius * stroke.radius;
 }
 
 }  // namespace pointwright

@@ -50,6 +50,9 @@ Result<void> validate(const Shape& shape);
 /// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for a stroke.
 bool contains(const Shape& shape, const Vec3d& point);
 
+/// Squared distance from the point to the segment `segment` of the stroke, numbered as below.
+double stroke_segment_distance_sq(const Stroke& stroke, std::size_t segment, const Vec3d& point);
+
 /// Whether the point lies within the stroke's radius of its segment `segment` (from that vertex to the next;
 /// a stroke of one vertex has one segment, the vertex itself). A stroke contains what any of its segments
 /// contains.

@@ -48,8 +48,11 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
   const Level& finest = before->surface.surface->finest();
-  for (const PaintOperation& operation : operations)
-    pointwright::paint(operation, kind, finest.position, finest.normal, params_.cloud->origin, *marks);
+  for (const PaintOperation& operation : operations) {
+    pointwright::paint(operation, kind, finest.position, finest.normal, params_.cloud->origin, *marks,
+                       &context_);
+    if (auto open = check_open(); !open.ok()) return open.problem();
+  }
   Painted result;
   for (std::size_t i = 0; i < marks->size(); ++i)
     if ((*marks)[i] != (*before->marks)[i]) ++result.changed;

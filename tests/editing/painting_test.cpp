@@ -2,7 +2,9 @@
 
 #include <doctest/doctest.h>
 
+#include <chrono>
 #include <limits>
+#include <vector>
 
 #include "tests/editing/editing_support.h"
 
@@ -104,6 +106,50 @@ TEST_CASE("culling never changes what a shape covers") {
         },
         [](const Marks& a, const Marks& b) { CHECK(a == b); });
   }
+}
+
+TEST_CASE("a long stroke of long segments costs what lies within its radius, not samples times segments") {
+  // Diagonals that zig-zag past the cloud: the bounding box of each holds all of it, none comes near.
+  const Points position = test::random_points(20'000, 5);
+  Stroke zigzag{.vertices = {}, .radius = 0.01};
+  for (std::size_t i = 0; i < kMaxStrokeVertices; ++i) {
+    const double z = static_cast<double>(i) * 1e-6;
+    zigzag.vertices.push_back(i % 2 == 0 ? Vec3d(-10.0, 5.0, z) : Vec3d(5.0, -10.0, z));
+  }
+  Marks marks(position.size(), 0);
+  const auto begin = std::chrono::steady_clock::now();
+  CHECK(paint({.shape = zigzag}, RegionKind::kZero, position, Points(), Vec3d::Zero(), marks) == 0);
+  // Testing every segment at every sample takes 30 s.
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
+}
+
+TEST_CASE("culling keeps the segments that only just reach, at large coordinates too") {
+  const Vec3d origin(1e9, -3e8, 7e8);
+  Points position;
+  Stroke stroke{.vertices = {}, .radius = 0.25};
+  std::vector<Vec3f> places;
+  for (int i = 0; i < 2000; ++i) {
+    const auto x = static_cast<float>(i % 100);
+    const auto y = static_cast<float>(i / 100);
+    places.emplace_back(x, y, i % 2 == 0 ? 0.25F : 0.5F);  // at the radius, and beyond it
+    stroke.vertices.push_back(origin + Vec3d(static_cast<double>(x), static_cast<double>(y), 0.0));
+  }
+  position.resize(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) position.set(i, places[i]);
+  Marks marks(places.size(), 0);
+  paint({.shape = stroke}, RegionKind::kZero, position, Points(), origin, marks);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    REQUIRE((marks[i] != 0) == contains(stroke, origin + position[i].cast<double>()));
+  }
+  CHECK(count_marked(marks, RegionKind::kZero) >= 1000);
+}
+
+TEST_CASE("cancelled painting stops") {
+  ExecutionContext context;
+  context.cancel();
+  Marks marks(300, 0);
+  paint({.shape = Everything{}}, RegionKind::kZero, Points(300), Points(), Vec3d::Zero(), marks, &context);
+  CHECK(count_marked(marks, RegionKind::kZero) == 0);
 }
 
 TEST_CASE("painting works on any number of samples") {

@@ -133,6 +133,22 @@ TEST_CASE("closing a session cancels its building") {
   CHECK(kind_of(session->paint(RegionKind::kZero, left_of(0.2))) == ProblemKind::kNotFound);
 }
 
+TEST_CASE("closing a session ends its painting") {
+  Workshop workshop;
+  const auto session = workshop.ready();
+  // Passes above the whole sheet, near enough to be tested everywhere, and covers nothing.
+  Stroke stroke{.vertices = {}, .radius = 1e-6};
+  for (int i = 0; i < 100'000; ++i)
+    stroke.vertices.emplace_back(i % 2 == 0 ? -1.0 : 2.0, 1e-3 * (i / 2 % 1000), 0.03);
+  const std::vector<PaintOperation> operations(5, PaintOperation{.shape = stroke});
+  std::thread closer([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    session->close("the session was deleted");
+  });
+  CHECK(kind_of(session->replace_painting(RegionKind::kZero, operations)) == ProblemKind::kNotFound);
+  closer.join();
+}
+
 TEST_CASE("painting counts what changed and raises the revision") {
   Workshop workshop;
   const auto session = workshop.ready();
