@@ -16,6 +16,8 @@ namespace {
 
 constexpr double kCellOfScale = 0.7;
 constexpr std::uint32_t kSmoothingNeighbors = 10;
+// On a grid that is even next to the scale about five are enough.
+constexpr std::uint32_t kMaxIterations = 200;
 
 // Samples sorted by grid cell: `order` lists them, cell c holds order[first[c] .. first[c + 1]).
 struct Grid {
@@ -275,7 +277,7 @@ Result<BaseSurface> build_base_surface(const Points& position, const Points& nor
   if (rest > 0.0 && smoothing_graph.k > 0 && base.position.size() > 2 * kSmoothingNeighbors) {
     auto smoothed =
         smooth_to_scale(base.position, base.normal, smoothing_graph, static_cast<float>(std::sqrt(rest)),
-                        SmoothingDirection::kAlongNormal, &context);
+                        SmoothingDirection::kAlongNormal, kMaxIterations, &context);
     if (!smoothed) return smoothed.error();
     const double reached = static_cast<double>(smoothed.value().scale);
     variance += reached * reached;

@@ -24,7 +24,8 @@ struct BaseSurface {
   std::vector<std::uint32_t> counterpart;  ///< per sample of P: the sample of Q that stands for it
   /// Smoothing scale of the whole that was reached, model units: the root of what grid, umbrella and
   /// least-squares planes have as variance. Less than was asked for where Q has too few samples to be
-  /// smoothed further, more where the planes alone, over kPlaneNeighbors sparse samples, smooth more.
+  /// smoothed further or lies in clusters that 200 iterations do not join, more where the planes alone, over
+  /// kPlaneNeighbors sparse samples, smooth more.
   float scale = 0.0F;
   std::uint32_t iterations = 0;  ///< umbrella iterations spent
 };
@@ -36,8 +37,8 @@ struct BaseSurface {
 /// smoothing), and makes the cost independent of the scale.
 /// Shapes:      N samples with unit normals, consistently oriented; M <= 2 N
 /// Pre:         scale > 0
-/// Errors:      kInvalidArgument (scale out of reach), kCancelled
-/// Cost:        O(N) sort and O(M k)
+/// Errors:      kCancelled
+/// Cost:        O(N) sort and O(M k) an iteration, about 5 of them and at most 200
 /// Determinism: bitwise equal for any thread count
 Result<BaseSurface> build_base_surface(const Points& position, const Points& normal, const Vec3d& origin,
                                        float scale, const ExecutionContext& context);

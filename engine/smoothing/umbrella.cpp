@@ -195,9 +195,12 @@ class KernelVariance {
   // A sample's part of a step's lambda.
   [[nodiscard]] double rate(std::size_t i) const { return is_free_ ? 1.0 : rate_[i]; }
 
+  // What changes from step to step: x y z |p|^2, or the variance itself.
+  using Columns = std::vector<std::vector<double>>;
+
   // The columns after one more step of lambda.
-  [[nodiscard]] std::vector<std::vector<double>> stepped(double lambda) const {
-    std::vector<std::vector<double>> result = columns_;
+  [[nodiscard]] Columns stepped(double lambda) const {
+    Columns result(columns_.size(), std::vector<double>(graph_->count));
     for (std::size_t column = 0; column < columns_.size(); ++column) {
       const std::vector<double>& c = columns_[column];
       for_each_sample([&](std::size_t i) {
@@ -213,17 +216,17 @@ class KernelVariance {
     }
     return result;
   }
-  void step(double lambda) {
-    columns_ = stepped(lambda);
+  void take(Columns stepped) {
+    columns_ = std::move(stepped);
     is_first_ = false;
   }
 
   // Median over the samples of the variance per axis, half of the whole on a surface.
-  [[nodiscard]] double median() const {
-    std::vector<double> variance = columns_.back();
+  [[nodiscard]] double median(const Columns& columns) const {
+    std::vector<double> variance = columns.back();
     if (is_free_) {
       for_each_sample([&](std::size_t i) {
-        for (std::size_t axis = 0; axis < 3; ++axis) variance[i] -= columns_[axis][i] * columns_[axis][i];
+        for (std::size_t axis = 0; axis < 3; ++axis) variance[i] -= columns[axis][i] * columns[axis][i];
       });
     }
     return 0.5 * std::max(0.0, median_of(std::move(variance)));
@@ -239,8 +242,8 @@ class KernelVariance {
 
   const NeighborGraph* graph_;
   bool is_free_;
-  std::vector<std::vector<double>> columns_;  // x y z |p|^2; or the variance itself
-  std::vector<float> weights_;                // along the normals, as the next three
+  Columns columns_;
+  std::vector<float> weights_;  // along the normals, as the next three
   std::vector<double> first_gain_, gain_, rate_;
   bool is_first_ = true;
 };
@@ -339,8 +342,7 @@ Result<Points> smooth(const Points& points, const Points& normals, const Neighbo
 
 Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& normals,
                                         const NeighborGraph& graph, float scale, SmoothingDirection direction,
-                                        const ExecutionContext* context) {
-  constexpr std::uint32_t kMaxIterations = 10'000;
+                                        std::uint32_t max_iterations, const ExecutionContext* context) {
   if (!std::isfinite(scale) || scale < 0.0F) {
     return Error{.code = ErrorCode::kInvalidArgument,
                  .message = "the smoothing scale must be finite and not negative",
@@ -357,25 +359,17 @@ Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& norm
   Points change(points.size());
   double reached = 0.0;
   double first_gain = 0.0;
-  while (reached < goal * (1.0 - 1e-3)) {
+  while (reached < goal * (1.0 - 1e-3) && result.iterations < max_iterations) {
     if (context != nullptr && context->is_cancelled()) return cancelled_error();
-    if (result.iterations == kMaxIterations) {
-      return Error{.code = ErrorCode::kInvalidArgument,
-                   .message = "the smoothing scale is out of reach of iteration at this density",
-                   .field = "scale",
-                   .limit = std::sqrt(reached),
-                   .actual = static_cast<double>(scale)};
-    }
-    KernelVariance trial = variance;
-    trial.step(static_cast<double>(kLambda));
-    const double next = trial.median();
+    KernelVariance::Columns trial = variance.stepped(static_cast<double>(kLambda));
+    double next = variance.median(trial);
     if (result.iterations == 0) first_gain = next;
     if (next - reached <= kExhausted * first_gain) break;
     float lambda = kLambda;
     if (next > goal) {  // the last step: variance grows in proportion to lambda
       lambda = kLambda * static_cast<float>((goal - reached) / (next - reached));
-      trial = variance;
-      trial.step(static_cast<double>(lambda));
+      trial = variance.stepped(static_cast<double>(lambda));
+      next = variance.median(trial);
     }
     if (direction == SmoothingDirection::kAlongNormal && result.iterations > 0) {
       refit_normals(result.points, graph, current);
@@ -386,9 +380,9 @@ Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& norm
       }
     });
     add_step(change, direction, current, result.points);
-    variance = std::move(trial);
+    variance.take(std::move(trial));
     ++result.iterations;
-    reached = variance.median();
+    reached = next;
   }
   result.scale = static_cast<float>(std::sqrt(reached));
   return result;

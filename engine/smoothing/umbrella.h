@@ -40,9 +40,10 @@ struct UmbrellaParams {
 Result<void> validate(const UmbrellaParams& params);
 
 /// p' = p + lambda * umbrella(p), Eq. (7) and (8), `iterations` times, over the neighbourhoods of the graph.
-/// With local preservation a step is P += u - W^T u, u = lambda * umbrella: a bi-Laplacian flow that keeps
-/// the mean of all positions, gathered over reverse neighbours so that the result never depends on the thread
-/// count.
+/// With local preservation a step is P += u - (1/k) A^T u, u = lambda * umbrella and A the neighbour relation
+/// (Eq. 9, whatever the weights), gathered over reverse neighbours so that the result never depends on the
+/// thread count. Where samples move freely that keeps the mean of all positions; along the normals it does
+/// not, each sample taking its own normal's component only.
 /// Shapes:      N points, their graph, N unit normals (read only with kAlongNormal)
 /// Errors:      kInvalidArgument, kCancelled
 /// Cost:        O(iterations N k), parallel over samples
@@ -61,15 +62,19 @@ Result<Points> smooth(const Points& points, const Points& normals, const Neighbo
 ///   umbrella weights less the part of a least-squares slope; dense samples take smaller steps, sparse ones
 ///   larger, so that every s_i is near the median.
 /// Smoothing ends before the scale where a step adds less than a hundredth of the first one's variance, as on
-/// an object that is smaller than the scale.
+/// an object that is smaller than the scale, and after `max_iterations`, as where the steps of most samples
+/// stay within clusters far smaller than the scale.
 struct ScaledSmoothing {
   Points points;
   std::uint32_t iterations = 0;
-  float scale = 0.0F;  ///< the median reached, model units; less than asked for where the cloud is too small
+  float scale =
+      0.0F;  ///< the median reached, model units; less than asked for where smoothing ended before it
 };
-/// Errors: kInvalidArgument (scale not finite or < 0; more than 10,000 iterations needed), kCancelled
+/// Errors: kInvalidArgument (scale not finite or < 0), kCancelled
+/// Cost:   O(iterations N k), parallel over samples
 Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& normals,
                                         const NeighborGraph& graph, float scale, SmoothingDirection direction,
+                                        std::uint32_t max_iterations,
                                         const ExecutionContext* context = nullptr);
 
 }  // namespace pointwright

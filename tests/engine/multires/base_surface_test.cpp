@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/multires/decomposition.h"
@@ -26,6 +27,34 @@ Decomposition decomposed(const Surface& surface, const BaseSurface& base, double
   auto result = decompose(surface.position, surface.normal, base, static_cast<float>(spacing), {}, {});
   REQUIRE(result.ok());
   return std::move(result).value();
+}
+
+TEST_CASE("clusters that smoothing cannot join end it early, at the scale that was reached") {
+  // Eight samples around every second corner of the grid, one in each of its cells, almost in a plane; next
+  // clusters face opposite ways, so that the neighbours on the same side are those of the cluster alone.
+  constexpr double kCell = 0.7;
+  const Vec3d half(0.003, 0.003, 0.00003);
+  std::vector<Vec3f> places;
+  std::vector<Vec3f> normals;
+  for (int cluster = 0; cluster < 1000; ++cluster) {
+    const int x = cluster % 10;
+    const int y = cluster / 10 % 10;
+    const int z = cluster / 100;
+    const Vec3d corner = 2.0 * kCell * Vec3d(x, y, z);
+    for (int octant = 0; octant < 8; ++octant) {
+      const Vec3d side((octant & 1) != 0 ? 1.0 : -1.0, (octant & 2) != 0 ? 1.0 : -1.0,
+                       (octant & 4) != 0 ? 1.0 : -1.0);
+      places.emplace_back((corner + half.cwiseProduct(side)).cast<float>());
+      normals.emplace_back(0.0F, 0.0F, (x + y + z) % 2 == 0 ? 1.0F : -1.0F);
+    }
+  }
+  const BaseSurface base = base_of({.position = from_list(places), .normal = from_list(normals)}, 1.0);
+  CHECK(base.position.size() == places.size());
+  CHECK(base.iterations == 200);  // more would reach the scale
+  CHECK(base.scale > 0.5F);
+  CHECK(base.scale < 0.9F);
+  // On an even sampling few iterations do.
+  CHECK(base_of(sphere(10'000, 1.0, Sampling::kRandom), 0.15).iterations <= 20);
 }
 
 TEST_CASE("every sample has a counterpart nearby, on its own side") {

@@ -17,6 +17,7 @@ namespace {
 using namespace test;
 
 constexpr double kTau = 6.283185307179586;
+constexpr std::uint32_t kPlenty = 10'000;  // iterations: more than any scale here needs
 
 // Amplitude of sin(2 pi x / wavelength) in the heights, by least squares, without a margin along the border.
 double amplitude(const Points& points, double wavelength, double half, double margin) {
@@ -44,7 +45,7 @@ Run attenuate(Sampling sampling, double spacing, double wavelength, double scale
   const auto side = static_cast<std::size_t>(kWidth / spacing);
   const Surface surface = wave(side, spacing, sampling, height, wavelength);
   auto result = smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10),
-                                static_cast<float>(scale), direction);
+                                static_cast<float>(scale), direction, kPlenty);
   REQUIRE(result.ok());
   CHECK(relative_error(static_cast<double>(result.value().scale), scale) < 0.001);
   return {amplitude(result.value().points, wavelength, kWidth / 2, 4.0 * scale) / height,
@@ -105,13 +106,14 @@ TEST_CASE("a scale means the same at two densities") {
 TEST_CASE("scale 0 and clouds without neighbours stay as they are") {
   const Surface surface = sphere(500, 1.0, Sampling::kRandom);
   const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
-  const auto zero = smooth_to_scale(surface.position, surface.normal, graph, 0.0F, SmoothingDirection::kFree);
+  const auto zero =
+      smooth_to_scale(surface.position, surface.normal, graph, 0.0F, SmoothingDirection::kFree, kPlenty);
   REQUIRE(zero.ok());
   CHECK(zero.value().points == surface.position);
   CHECK(zero.value().iterations == 0);
   const Points pile = identical(30, {1, 1, 1});
   const auto same =
-      smooth_to_scale(pile, {}, build_neighbor_graph(pile, 10), 1.0F, SmoothingDirection::kFree);
+      smooth_to_scale(pile, {}, build_neighbor_graph(pile, 10), 1.0F, SmoothingDirection::kFree, kPlenty);
   REQUIRE(same.ok());
   CHECK(same.value().points == pile);
 }
@@ -121,7 +123,7 @@ TEST_CASE("a scale that is negative or not finite is refused") {
   const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
   for (const float scale : {-1.0F, std::nanf(""), std::numeric_limits<float>::infinity()}) {
     const auto result =
-        smooth_to_scale(surface.position, surface.normal, graph, scale, SmoothingDirection::kFree);
+        smooth_to_scale(surface.position, surface.normal, graph, scale, SmoothingDirection::kFree, kPlenty);
     REQUIRE_FALSE(result.ok());
     CHECK(result.error().code == ErrorCode::kInvalidArgument);
     CHECK(result.error().field == "scale");
@@ -136,7 +138,7 @@ TEST_CASE("a closed cloud that is too small for the scale is smoothed as far as 
     const Surface surface = sphere(count, 1.0, Sampling::kRegular);
     const auto result =
         smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10), 50.0F,
-                        SmoothingDirection::kFree);
+                        SmoothingDirection::kFree, kPlenty);
     REQUIRE(result.ok());
     CHECK(relative_error(static_cast<double>(result.value().scale), std::sqrt(0.5 * 0.99)) < 0.002);
     CHECK(relative_error(static_cast<double>(bounds_of(result.value().points).diagonal()),
@@ -153,7 +155,7 @@ TEST_CASE("a random closed cloud ends further out, as its slowest wave outlives 
     const Surface surface = sphere(300, 1.0, Sampling::kRandom, seed);
     const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
     const auto result =
-        smooth_to_scale(surface.position, surface.normal, graph, 50.0F, SmoothingDirection::kFree);
+        smooth_to_scale(surface.position, surface.normal, graph, 50.0F, SmoothingDirection::kFree, kPlenty);
     REQUIRE(result.ok());
     CHECK(relative_error(static_cast<double>(result.value().scale), std::sqrt(0.5 * 0.975)) < 0.015);
     const float left = bounds_of(result.value().points).diagonal();
@@ -172,24 +174,35 @@ TEST_CASE("a sheet that is too small for the scale says how far it was smoothed"
     const Surface surface = plane(side, 1.0, Sampling::kJittered);
     const auto result =
         smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10), 1e4F,
-                        SmoothingDirection::kAlongNormal);
+                        SmoothingDirection::kAlongNormal, kPlenty);
     REQUIRE(result.ok());
     MESSAGE("side " << side << ": reached " << result.value().scale);
     CHECK(relative_error(static_cast<double>(result.value().scale), 0.41 * static_cast<double>(side)) < 0.08);
   }
 }
 
-TEST_CASE("a scale that needs too many iterations is refused with the greatest that can be had") {
+TEST_CASE("at the limit of iterations smoothing ends, and says how far it came") {
   const Surface surface = sphere(300, 1.0, Sampling::kRandom);
-  const auto result =
-      smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10), 1e4F,
-                      SmoothingDirection::kAlongNormal);
-  REQUIRE_FALSE(result.ok());
-  CHECK(result.error().code == ErrorCode::kInvalidArgument);
-  CHECK(result.error().field == "scale");
-  REQUIRE(result.error().limit.has_value());
-  CHECK(*result.error().limit > 10.0);
-  CHECK(*result.error().limit < 1e4);
+  const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
+  const auto to_scale = [&](float scale, std::uint32_t limit) {
+    auto result = smooth_to_scale(surface.position, surface.normal, graph, scale,
+                                  SmoothingDirection::kAlongNormal, limit);
+    REQUIRE(result.ok());
+    return std::move(result).value();
+  };
+  const ScaledSmoothing few = to_scale(1e4F, 20);
+  CHECK(few.iterations == 20);
+  const ScaledSmoothing more = to_scale(1e4F, 80);
+  CHECK(more.iterations == 80);
+  CHECK(more.scale > 1.5F * few.scale);
+  CHECK(more.scale < 1e4F);
+  // The scale that it says is the one that would have been met in as many steps.
+  const ScaledSmoothing met = to_scale(few.scale, kPlenty);
+  CHECK(met.iterations == 20);
+  CHECK(met.scale == doctest::Approx(static_cast<double>(few.scale)).epsilon(1e-3));
+  const ScaledSmoothing none = to_scale(1.0F, 0);
+  CHECK(none.points == surface.position);
+  CHECK(none.scale == 0.0F);
 }
 
 TEST_CASE("a cancel from elsewhere ends the smoothing") {
@@ -202,8 +215,8 @@ TEST_CASE("a cancel from elsewhere ends the smoothing") {
     cancelled_at = std::chrono::steady_clock::now();
     context.cancel();
   });
-  const auto result =
-      smooth_to_scale(surface.position, surface.normal, graph, 40.0F, SmoothingDirection::kFree, &context);
+  const auto result = smooth_to_scale(surface.position, surface.normal, graph, 40.0F,
+                                      SmoothingDirection::kFree, kPlenty, &context);
   const auto ended_at = std::chrono::steady_clock::now();
   canceller.join();
   REQUIRE_FALSE(result.ok());
@@ -217,10 +230,10 @@ TEST_CASE("smoothing to a scale gives the same bytes for any thread count") {
   const auto run = [&](int threads) {
     Points points;
     with_threads(threads, [&] {
-      points =
-          smooth_to_scale(surface.position, surface.normal, graph, 0.1F, SmoothingDirection::kAlongNormal)
-              .value()
-              .points;
+      points = smooth_to_scale(surface.position, surface.normal, graph, 0.1F,
+                               SmoothingDirection::kAlongNormal, kPlenty)
+                   .value()
+                   .points;
     });
     return points;
   };
