@@ -42,7 +42,9 @@ struct Hierarchy {
   NeighborGraph graph;                       ///< of the rest samples of the finest level; serves all levels
   std::vector<float> spacing;                ///< local sample spacing of the rest surface, model units
   std::vector<DecompositionReport> reports;  ///< one per band
-  std::size_t component_count = 0;           ///< connected components of the neighbour graph
+  /// Connected components of the neighbour graph, each of which has a side chosen for it; 0 where normals
+  /// were uploaded, which choose it.
+  std::size_t component_count = 0;
 };
 
 /// Paper:       §3, §3.4; engine/README.md says where it departs

@@ -13,12 +13,13 @@
 namespace pointwright {
 
 /// N x k neighbour indices. Neighbour j of sample i is `index(i, j)`; neighbours are ordered by distance,
-/// then index, and never contain the sample itself or an exact duplicate of it. Duplicates share one list.
+/// then index. Where duplicates are adjacent (coherent_order leaves them so) they share one list, and no list
+/// contains the sample itself or an exact duplicate of it.
 struct NeighborGraph {
   std::size_t count = 0;             ///< N
   std::uint32_t k = 0;               ///< neighbours per sample: min(k asked for, distinct samples - 1)
   std::vector<std::uint32_t> lanes;  ///< [block][j][lane], kSimdBlock lanes; padding lanes point at sample 0
-  std::size_t duplicate_count = 0;   ///< samples that stand exactly where an earlier one stands
+  std::size_t duplicate_count = 0;   ///< samples that stand exactly where the one before stands
 
   [[nodiscard]] std::uint32_t index(std::size_t i, std::uint32_t j) const {
     return lanes[(i / kSimdBlock * k + j) * kSimdBlock + i % kSimdBlock];
@@ -33,7 +34,8 @@ struct NeighborGraph {
 };
 
 /// The k nearest neighbours of every sample (Euclidean, §2.1).
-/// Pre:         points in coherent order (speed only)
+/// Pre:         exact duplicates adjacent, as in coherent order, which is also what makes it fast. Duplicates
+///              that stand apart count as samples of their own: they list each other, at distance 0
 /// Cost:        O(N k log N) time; 4 k bytes a sample
 /// Determinism: bitwise equal for any thread count
 /// Cancels:     between blocks of samples; the result is then incomplete and must be dropped

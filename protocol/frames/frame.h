@@ -109,14 +109,15 @@ void encode_key_frame(const FrameLayout& layout, const FrameColumns& columns, co
                       std::uint16_t attributes, FrameBytes& out);
 
 /// Writes the delta frame with the given blocks. The receiver's last frame must have had the same layout,
-/// level, attributes, origin and ranges; a change of these takes a key frame.
+/// level, attributes, origin, ranges and radii; a change of these takes a key frame. Radii stand in key frames
+/// only, whatever `attributes` names.
 /// Pre:  as encode_key_frame; blocks strictly ascending and < block_count
 /// Cost: O(samples of the blocks)
 void encode_delta_frame(const FrameLayout& layout, const FrameColumns& columns, const FrameState& state,
                         std::uint16_t attributes, std::span<const std::uint32_t> blocks, FrameBytes& out);
 
-/// The blocks in which any column that `attributes` names differs, ascending. Columns that are the same
-/// memory in both are equal without a look.
+/// The blocks in which any column that `attributes` names differs, radii excepted: a change of radii takes a
+/// key frame. Ascending. Columns that are the same memory in both are equal without a look.
 /// Pre:  both as in encode_key_frame
 /// Cost: O(N), parallel
 std::vector<std::uint32_t> changed_blocks(const FrameLayout& layout, const FrameColumns& before,

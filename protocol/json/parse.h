@@ -88,7 +88,7 @@ struct ParseLimits {
 
 /// Parses one JSON text (RFC 8259). Refuses malformed text and bad UTF-8 (kMalformed), too many bytes
 /// (kTooLarge); duplicate names, numbers beyond float64, too much depth and too many values (kInvalid).
-/// Cost: O(bytes log bytes); memory stays below 100 bytes a value
+/// Cost: O(bytes log bytes); memory stays below 100 bytes a value, and the strings' own bytes
 Parsed<Json> parse_json(std::string_view text, const ParseLimits& limits = {});
 
 /// A pointer one member further: "/a" and "b/c" make "/a/b~1c". Names from outside are shortened to 64 bytes.

@@ -45,7 +45,16 @@ TEST_CASE("the smallest eigenvector is the one that Eigen's solver finds") {
   }
 }
 
-TEST_CASE("a matrix without a single smallest eigenvalue gives a unit vector of its null space") {
+TEST_CASE("two equal smallest eigenvalues that do not vanish give some unit vector") {
+  Vec3d found;
+  CHECK(smallest_eigenvector({.xx = 1.0, .yy = 1.0, .zz = 1.0}, found));
+  CHECK(found.norm() == doctest::Approx(1.0));
+  CHECK(smallest_eigenvector({.xx = 1.0, .yy = 0.5, .zz = 0.5}, found));
+  CHECK(found.norm() == doctest::Approx(1.0));
+  CHECK(std::abs(found.x()) < 1e-6);
+}
+
+TEST_CASE("of a line's matrix, and of none, the vector is a unit one of the null space") {
   Random random(2);
   for (int trial = 0; trial < 200; ++trial) {
     const Vec3d along = random.direction();

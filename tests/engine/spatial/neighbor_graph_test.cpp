@@ -96,6 +96,21 @@ TEST_CASE("duplicates share one list and never list each other") {
   CHECK(pairs == graph.duplicate_count);
 }
 
+TEST_CASE("duplicates that stand apart in the order count as samples of their own") {
+  Points points = random_points(400, 23);
+  for (std::size_t i = 0; i < 100; ++i) points.set(i + 200, points[i]);
+  const NeighborGraph graph = build_neighbor_graph(points, 10);
+  CHECK(graph.duplicate_count == 0);
+  for (std::size_t i = 0; i < 100; ++i) {
+    CHECK(graph.index(i, 0) == i + 200);
+    CHECK(graph.index(i + 200, 0) == i);
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::uint32_t j = 0; j < graph.k; ++j) CHECK(graph.index(i, j) != i);
+  }
+  CHECK(build_neighbor_graph(coherent(points), 10).duplicate_count == 100);
+}
+
 TEST_CASE("a cloud with fewer samples than neighbours asked for lists all the others") {
   for (const std::size_t n : {1U, 2U, 3U, 10U, 11U}) {
     CAPTURE(n);
