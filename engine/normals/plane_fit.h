@@ -12,9 +12,9 @@ struct Symmetric3d {
 
 /// Unit eigenvector of the smallest eigenvalue of a positive semi-definite matrix, as the dominant
 /// eigenvector of its adjugate by repeated squaring: no branches, no iteration count that depends on the
-/// data. Returns false only where the two smallest eigenvalues vanish next to the largest (points on a line or
-/// in one place): `vector` is then some unit vector of the null space. Where they are equal but do not vanish,
-/// as for a ball of points, it returns true with a vector that rounding chooses.
+/// data. Returns false only where the two smallest eigenvalues vanish next to the largest (points on a line
+/// or in one place): `vector` is then some unit vector of the null space. Where they are equal but do not
+/// vanish, as for a ball of points, it returns true with a vector that rounding chooses.
 /// Cost: about 150 flops
 bool smallest_eigenvector(const Symmetric3d& matrix, Vec3d& vector);
 

@@ -109,8 +109,8 @@ void encode_key_frame(const FrameLayout& layout, const FrameColumns& columns, co
                       std::uint16_t attributes, FrameBytes& out);
 
 /// Writes the delta frame with the given blocks. The receiver's last frame must have had the same layout,
-/// level, attributes, origin, ranges and radii; a change of these takes a key frame. Radii stand in key frames
-/// only, whatever `attributes` names.
+/// level, attributes, origin, ranges and radii; a change of these takes a key frame. Radii stand in key
+/// frames only, whatever `attributes` names.
 /// Pre:  as encode_key_frame; blocks strictly ascending and < block_count
 /// Cost: O(samples of the blocks)
 void encode_delta_frame(const FrameLayout& layout, const FrameColumns& columns, const FrameState& state,
