@@ -1,7 +1,13 @@
 #include "server/sessions/display.h"
 
+#include <algorithm>
+#include <iterator>
+
 namespace pointwright::server {
 namespace {
+
+/// Frames of one picture that are kept: viewers mostly ask for the same delta, newcomers for the key.
+constexpr std::size_t kKeptFrames = 3;
 
 protocol::FrameState frame_state(const Picture& picture, const Cloud& cloud, std::uint32_t level) {
   return {.level = static_cast<std::uint8_t>(level),
@@ -91,24 +97,30 @@ Display::Frame Display::frame_since(std::uint64_t version, std::uint16_t attribu
   // Held while encoding: of several viewers that want the same frame one makes it, and the others wait for
   // it.
   const std::lock_guard lock(now->frames_mutex);
-  SharedFrame& frame = now->frames[{since, attributes}];
-  if (frame == nullptr) {
-    const std::uint32_t level = finest_level(now->picture);
-    auto state = frame_state(now->picture, *cloud_, level);
-    state.bounds = now->bounds;
-    const auto columns = frame_columns(now->picture, *cloud_, level);
-    auto bytes = std::make_shared<protocol::FrameBytes>();
-    if (since == 0) {
-      encode_key_frame(layout_, columns, state, attributes, *bytes);
-    } else {
-      std::vector<std::uint32_t> blocks;
-      for (std::uint32_t block = 0; block < layout_.block_count(); ++block)
-        if (now->block_versions[block] > since) blocks.push_back(block);
-      encode_delta_frame(layout_, columns, state, attributes, blocks, *bytes);
-    }
-    frame = std::move(bytes);
+  auto& frames = now->frames;
+  const auto kept = std::find_if(frames.begin(), frames.end(), [&](const KeptFrame& f) {
+    return f.since == since && f.attributes == attributes;
+  });
+  if (kept != frames.end()) {
+    std::rotate(frames.begin(), kept, std::next(kept));
+    return {frames.front().bytes, now->version};
   }
-  return {frame, now->version};
+  const std::uint32_t level = finest_level(now->picture);
+  auto state = frame_state(now->picture, *cloud_, level);
+  state.bounds = now->bounds;
+  const auto columns = frame_columns(now->picture, *cloud_, level);
+  auto bytes = std::make_shared<protocol::FrameBytes>();
+  if (since == 0) {
+    encode_key_frame(layout_, columns, state, attributes, *bytes);
+  } else {
+    std::vector<std::uint32_t> blocks;
+    for (std::uint32_t block = 0; block < layout_.block_count(); ++block)
+      if (now->block_versions[block] > since) blocks.push_back(block);
+    encode_delta_frame(layout_, columns, state, attributes, blocks, *bytes);
+  }
+  if (frames.size() == kKeptFrames) frames.pop_back();
+  frames.insert(frames.begin(), {.since = since, .attributes = attributes, .bytes = std::move(bytes)});
+  return {frames.front().bytes, now->version};
 }
 
 }  // namespace pointwright::server

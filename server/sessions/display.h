@@ -2,10 +2,8 @@
 // What a session shows right now, and the frames that bring a viewer from what it saw last to that.
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
-#include <tuple>
 #include <vector>
 
 #include "engine/core/cloud.h"
@@ -55,6 +53,11 @@ class Display {
   [[nodiscard]] const protocol::FrameLayout& layout() const { return layout_; }
 
  private:
+  struct KeptFrame {
+    std::uint64_t since = 0;
+    std::uint16_t attributes = 0;
+    SharedFrame bytes;
+  };
   struct Shown {
     Picture picture;
     protocol::SurfaceBounds bounds;
@@ -62,7 +65,7 @@ class Display {
     std::uint64_t key_version = 0;              // viewers of older pictures need a key
     std::vector<std::uint64_t> block_versions;  // the picture in which each block last changed
     std::mutex frames_mutex;                    // guards frames
-    std::map<std::pair<std::uint64_t, std::uint16_t>, SharedFrame> frames;
+    std::vector<KeptFrame> frames;              // a few, the last used one first
   };
   [[nodiscard]] std::shared_ptr<Shown> shown() const;
 
