@@ -31,7 +31,9 @@ const std::string& single(const std::vector<std::string>& values) {
 }
 
 SampleFile parse_sample(const std::string& text) {
-  const std::size_t equals = text.rfind('=');
+  std::size_t equals = text.rfind('=');
+  // A name has no '/': then the '=' is part of the path.
+  if (equals != std::string::npos && text.find('/', equals) != std::string::npos) equals = std::string::npos;
   SampleFile sample{.path = text.substr(0, equals), .name = {}};
   if (equals != std::string::npos) sample.name = text.substr(equals + 1);
   if (sample.path.empty() || (equals != std::string::npos && sample.name.empty()))
@@ -48,6 +50,11 @@ std::string parse_host_name(std::string text) {
            c == ':';
   });
   if (!plain) throw std::invalid_argument("\"" + text + "\" is not a host name");
+  // An IPv6 address stands in brackets in a Host header.
+  if (text.front() != '[' && std::count(text.begin(), text.end(), ':') > 1) text = "[" + text + "]";
+  // Hosts are compared without their port; an address in brackets has colons of its own.
+  if (text.find(':', text.front() == '[' ? std::min(text.find(']'), text.size()) : 0) != std::string::npos)
+    throw std::invalid_argument("\"" + text + "\" names a port; give the host name alone");
   return text;
 }
 

@@ -99,6 +99,12 @@ TEST_CASE("samples and allowed hosts can be given several times") {
   CHECK(config.samples[1] == SampleFile{"b.ply", "b.ply"});
   CHECK(config.allowed_hosts == std::vector<std::string>{"scan.example.org"});
   CHECK(good(read({}, {{"POINTWRIGHT_ALLOWED_HOSTS", "a.org,b.org"}})).allowed_hosts.size() == 2);
+  CHECK(good(read({"--sample", "a=b/c.ply"})).samples[0] == SampleFile{"a=b/c.ply", "c.ply"});
+  CHECK(good(read({"--sample", "a=b/c.ply=d"})).samples[0] == SampleFile{"a=b/c.ply", "d"});
+  // Hosts are compared without a port: one that is given would never match.
+  CHECK(refusal(read({"--allowed-hosts", "scan.example.org:8080"})).find("port") != std::string::npos);
+  CHECK(refusal(read({"--allowed-hosts", "[fd00::1]:8080"})).find("port") != std::string::npos);
+  CHECK(good(read({"--allowed-hosts", "[fd00::1]"})).allowed_hosts == std::vector<std::string>{"[fd00::1]"});
 }
 
 TEST_CASE("unknown options and keys are errors, unknown variables are kept for a warning") {
