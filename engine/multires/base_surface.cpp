@@ -6,8 +6,9 @@
 #include <numeric>
 #include <utility>
 
+#include "engine/core/median.h"
 #include "engine/core/parallel.h"
-#include "engine/normals/plane_fit.h"
+#include "engine/normals/estimation.h"
 #include "engine/smoothing/umbrella.h"
 #include "engine/spatial/coherent_order.h"
 
@@ -181,32 +182,6 @@ NeighborGraph narrowed(const NeighborGraph& graph, std::uint32_t k) {
     for (std::uint32_t j = 0; j < result.k; ++j) result.index(i, j) = graph.index(i, j);
   }
   return result;
-}
-
-// Normals of the smoothed Q by plane fits over its same-side neighbours, on the side of the old normals.
-void refit_normals(const Points& position, const NeighborGraph& graph, Points& normal) {
-  Points fitted(position.size());
-  parallel_for(position.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      PlaneFit fit;
-      fit.add(0.0, 0.0, 0.0, 1.0);
-      for (std::uint32_t j = 0; j < graph.k; ++j) {
-        const Vec3d offset = (position[graph.index(i, j)] - position[i]).cast<double>();
-        fit.add(offset.x(), offset.y(), offset.z(), 1.0);
-      }
-      Vec3d n;
-      const Vec3d before = normal[i].cast<double>();
-      if (!fit.normal(n)) n = before;
-      fitted.set(i, (n.dot(before) < 0.0 ? Vec3d(-n) : n).cast<float>());
-    }
-  });
-  normal = std::move(fitted);
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // What the means over the cells smooth: the median over Q of the variance of a cell's samples about their

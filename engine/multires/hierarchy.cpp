@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/core/median.h"
 #include "engine/core/parallel.h"
 #include "engine/multires/base_surface.h"
 #include "engine/multires/decomposition.h"
@@ -26,13 +27,6 @@ Points adopt_normals(const Points& uploaded, const Points& estimated) {
     }
   });
   return result;
-}
-
-float median(std::vector<float> values) {
-  if (values.empty()) return 0.0F;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // One band: fills `below` with the base level of `above` and returns its detail coefficients.

@@ -27,4 +27,11 @@ struct NormalParams {
 std::size_t estimate_normals(const Points& points, const NeighborGraph& graph, const NormalParams& params,
                              Points& normal, const ExecutionContext* context = nullptr);
 
+/// Unit normals fitted anew by unweighted planes over each sample and its neighbours, on the side of the old
+/// ones, which stay where the neighbours span no plane.
+/// Shapes:      N points, their graph, N unit normals
+/// Cost:        O(N k), parallel
+/// Determinism: bitwise equal for any thread count
+void refit_normals(const Points& points, const NeighborGraph& graph, Points& normals);
+
 }  // namespace pointwright

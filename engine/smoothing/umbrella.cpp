@@ -9,8 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/median.h"
 #include "engine/core/parallel.h"
-#include "engine/normals/plane_fit.h"
+#include "engine/normals/estimation.h"
 
 namespace pointwright {
 namespace {
@@ -142,12 +143,6 @@ std::vector<double> mean_squares(const Points& points, const NeighborGraph& grap
   return result;
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Of each sample's lambda: what makes steps mean the same where samples are dense and where they are sparse.
 std::vector<double> step_rates(const std::vector<double>& gain, const NeighborGraph& graph) {
   std::vector<double> smooth_gain(gain.size());  // a single sample's own gain scatters too much
@@ -156,7 +151,7 @@ std::vector<double> step_rates(const std::vector<double>& gain, const NeighborGr
     for (std::uint32_t j = 0; j < graph.k; ++j) sum += gain[graph.index(i, j)];
     smooth_gain[i] = sum / static_cast<double>(graph.k + 1);
   }
-  const double middle = median_of(smooth_gain);
+  const double middle = median(smooth_gain);
   std::vector<double> rate(gain.size(), 1.0);
   for (std::size_t i = 0; i < gain.size(); ++i) {
     if (smooth_gain[i] > 0.0) rate[i] = std::clamp(middle / smooth_gain[i], kLeastRate, kGreatestRate);
@@ -229,7 +224,7 @@ class KernelVariance {
         for (std::size_t axis = 0; axis < 3; ++axis) variance[i] -= columns[axis][i] * columns[axis][i];
       });
     }
-    return 0.5 * std::max(0.0, median_of(std::move(variance)));
+    return 0.5 * std::max(0.0, pointwright::median(std::move(variance)));
   }
 
  private:
@@ -247,27 +242,6 @@ class KernelVariance {
   std::vector<double> first_gain_, gain_, rate_;
   bool is_first_ = true;
 };
-
-// Normals of the smoothed samples, on the side of the old ones, which stay where the neighbours span no
-// plane.
-void refit_normals(const Points& points, const NeighborGraph& graph, Points& normals) {
-  Points fitted(points.size());
-  parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      PlaneFit fit;
-      fit.add(0.0, 0.0, 0.0, 1.0);
-      for (std::uint32_t j = 0; j < graph.k; ++j) {
-        const Vec3d e = (points[graph.index(i, j)] - points[i]).cast<double>();
-        fit.add(e.x(), e.y(), e.z(), 1.0);
-      }
-      const Vec3d before = normals[i].cast<double>();
-      Vec3d n;
-      if (!fit.normal(n)) n = before;
-      fitted.set(i, (n.dot(before) < 0.0 ? Vec3d(-n) : n).cast<float>());
-    }
-  });
-  normals = std::move(fitted);
-}
 
 void add_step(const Points& change, SmoothingDirection direction, const Points& normals, Points& points) {
   parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
