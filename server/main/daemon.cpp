@@ -1,5 +1,6 @@
 #include "server/main/daemon.h"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -50,6 +51,12 @@ void raise_descriptor_limit(const Config& config, Log& log) {
                {"wanted", wanted}});
 }
 
+/// Columns of clouds and surfaces go back to the system when they are freed, whatever was allocated since.
+void return_freed_memory() {
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);  // fixed: left alone it grows with the first large piece freed
+  ::mallopt(M_ARENA_MAX, 4);             // each connection has a thread, and arenas keep what they got
+}
+
 /// Loads the clouds of --sample. A sentence where one cannot be loaded.
 std::optional<std::string> load_samples(Service& service, Log& log) {
   for (const SampleFile& sample : service.config.samples) {
@@ -76,6 +83,7 @@ std::optional<std::string> write_port_file(const std::string& path, std::uint16_
 }  // namespace
 
 int run_daemon(const Config& config) {
+  return_freed_memory();
   std::signal(SIGPIPE, SIG_IGN);
   sigset_t signals;
   sigemptyset(&signals);
@@ -118,7 +126,9 @@ int run_daemon(const Config& config) {
                {"host", config.host},
                {"port", server.port()},
                {"pid", ::getpid()}});
-    std::cout << "pointwrightd listens on http://" << config.host << ":" << server.port() << "/" << std::endl;
+    const bool is_ipv6 = config.host.find(':') != std::string::npos;
+    std::cout << "pointwrightd listens on http://" << (is_ipv6 ? "[" + config.host + "]" : config.host) << ":"
+              << server.port() << "/" << std::endl;
 
     int signal = 0;
     ::sigwait(&signals, &signal);

@@ -44,6 +44,12 @@ TEST_CASE("samples given at the start are there, under their names") {
   CHECK(clouds[0]["report"]["format"] == "draco");
 }
 
+TEST_CASE("the address that is printed can be opened, of IPv6 too") {
+  const Ended ended = run({POINTWRIGHTD_PATH, "--host", "::1", "--port", "0"}, std::chrono::seconds(2));
+  if (ended.status == 1) return;  // a machine without IPv6
+  CHECK(ended.out.find("http://[::1]:") != std::string::npos);
+}
+
 TEST_CASE("the viewer's files are served from an exact table and nothing else of the folder") {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "web/assets");
