@@ -7,6 +7,13 @@
 #include "engine/editing/region.h"
 
 namespace pointwright::server {
+namespace {
+
+/// The fractions of a diagonal that builders take as scales.
+constexpr float kLeastScale = 1e-4F;
+constexpr float kGreatestScale = 0.2F;
+
+}  // namespace
 
 std::uint64_t memory_of(const SurfaceState& state) {
   if (state.surface == nullptr) return 0;
@@ -23,11 +30,13 @@ Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState&
   current.normal = state.surface->finest().normal;
   current.exact_position.clear();
   current.position_is_double = false;
-  // The scales are lengths of the model, not of whatever box the edited surface happens to fill.
+  // The scales are lengths of the model, not of whatever box the edited surface happens to fill; where that
+  // box leaves no such fraction, the nearest one that a builder takes. The reports say what was reached.
   HierarchyParams params = rest.params;
   const float diagonal = bounds_of(current.position).diagonal();
   if (diagonal > 0.0F)
-    for (float& scale : params.scales) scale = std::min(scale * (rest.diagonal / diagonal), 0.2F);
+    for (float& scale : params.scales)
+      scale = std::clamp(scale * (rest.diagonal / diagonal), kLeastScale, kGreatestScale);
   auto built = rest.build(current, params, context);
   if (!built) return built.error();
   auto surface = std::make_shared<MultiresSurface>(std::move(built.value().surface));
