@@ -153,9 +153,10 @@ JsonDocument session_list(const std::vector<SessionSummary>& sessions) {
 }
 
 JsonDocument painting_document(RegionKind region, std::uint64_t samples,
-                               const std::vector<PaintOperation>& operations) {
-  return JsonDocument{
-      {"region", region_name(region)}, {"samples", samples}, {"operations", document_array(operations)}};
+                               const std::vector<std::shared_ptr<const PaintOperation>>& operations) {
+  JsonDocument list = JsonDocument::array();
+  for (const auto& operation : operations) list.push_back(to_json(*operation));
+  return JsonDocument{{"region", region_name(region)}, {"samples", samples}, {"operations", std::move(list)}};
 }
 
 JsonDocument edit_list(std::uint32_t head, const std::vector<EditRecord>& edits) {

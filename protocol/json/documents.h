@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -98,7 +99,7 @@ JsonDocument cloud_list(const std::vector<CloudDocument>& clouds);
 JsonDocument session_list(const std::vector<SessionSummary>& sessions);
 /// {"region", "samples", "operations"}
 JsonDocument painting_document(RegionKind region, std::uint64_t samples,
-                               const std::vector<PaintOperation>& operations);
+                               const std::vector<std::shared_ptr<const PaintOperation>>& operations);
 /// {"head", "edits"}
 JsonDocument edit_list(std::uint32_t head, const std::vector<EditRecord>& edits);
 

@@ -19,6 +19,8 @@ constexpr std::array kTable = {
               "memory of one session's stored history states; others are replayed"},
     LimitInfo{"max_edits", &Limits::max_edits, 1, 1'000'000, "edits in the history of one session"},
     LimitInfo{"max_operations", &Limits::max_operations, 1, 10'000, "painting operations of one region"},
+    LimitInfo{"max_painting_vertices", &Limits::max_painting_vertices, 1, 1'000'000'000,
+              "vertices of all strokes of one region"},
     LimitInfo{"max_json_bytes", &Limits::max_json_bytes, 256, 64ULL << 20U, "bytes of a JSON body"},
     LimitInfo{"max_json_depth", &Limits::max_json_depth, 8, 64, "nesting of a JSON body"},
     LimitInfo{"max_connections", &Limits::max_connections, 8, 30'000, "connections served at once"},

@@ -18,6 +18,7 @@ struct Limits {
   std::uint64_t history_bytes = 512ULL << 20U;
   std::uint64_t max_edits = 10'000;
   std::uint64_t max_operations = 10'000;
+  std::uint64_t max_painting_vertices = 1'000'000;
   std::uint64_t max_json_bytes = 8ULL << 20U;
   std::uint64_t max_json_depth = 32;
   std::uint64_t max_connections = 1024;

@@ -9,7 +9,9 @@ Response put_preview(Service& service, const Request& request) {
   if (!session.ok()) return problem_response(session.problem(), request);
   const auto preview = parsed_body(service, request, protocol::parse_preview);
   if (!preview.ok()) return problem_response(preview.problem(), request);
-  if (auto put = session.value()->put_preview(preview.value()); !put.ok())
+  const auto expected = expected_revision(request.head);
+  if (!expected.ok()) return problem_response(expected.problem(), request);
+  if (auto put = session.value()->put_preview(preview.value(), expected.value()); !put.ok())
     return problem_response(put.problem(), request);
   return {.status = 204};
 }

@@ -28,7 +28,10 @@ Response replace_painting(Service& service, const Request& request) {
   if (!session.ok()) return problem_response(session.problem(), request);
   auto operations = parsed_body(service, request, protocol::parse_painting);
   if (!operations.ok()) return problem_response(operations.problem(), request);
-  const auto painted = session.value()->replace_painting(region_of(request), std::move(operations.value()));
+  const auto expected = expected_revision(request.head);
+  if (!expected.ok()) return problem_response(expected.problem(), request);
+  const auto painted =
+      session.value()->replace_painting(region_of(request), std::move(operations.value()), expected.value());
   if (!painted.ok()) return problem_response(painted.problem(), request);
   return session_response(*session.value(), *painted.value().document);
 }
@@ -36,7 +39,9 @@ Response replace_painting(Service& service, const Request& request) {
 Response clear_painting(Service& service, const Request& request) {
   const auto session = session_of(service, request);
   if (!session.ok()) return problem_response(session.problem(), request);
-  const auto painted = session.value()->replace_painting(region_of(request), {});
+  const auto expected = expected_revision(request.head);
+  if (!expected.ok()) return problem_response(expected.problem(), request);
+  const auto painted = session.value()->replace_painting(region_of(request), {}, expected.value());
   if (!painted.ok()) return problem_response(painted.problem(), request);
   return session_response(*session.value(), *painted.value().document);
 }
@@ -46,7 +51,9 @@ Response paint_region(Service& service, const Request& request) {
   if (!session.ok()) return problem_response(session.problem(), request);
   const auto operation = parsed_body(service, request, protocol::parse_paint_operation);
   if (!operation.ok()) return problem_response(operation.problem(), request);
-  const auto painted = session.value()->paint(region_of(request), operation.value());
+  const auto expected = expected_revision(request.head);
+  if (!expected.ok()) return problem_response(expected.problem(), request);
+  const auto painted = session.value()->paint(region_of(request), operation.value(), expected.value());
   if (!painted.ok()) return problem_response(painted.problem(), request);
   const Document& document = *painted.value().document;
   protocol::JsonDocument body = protocol::to_json(session.value()->describe(document));

@@ -1,6 +1,7 @@
 #include "server/handlers/service.h"
 
 #include <algorithm>
+#include <charconv>
 #include <thread>
 
 namespace pointwright::server {
@@ -42,6 +43,21 @@ Outcome<std::shared_ptr<Session>> session_of(Service& service, const Request& re
 
 std::string revision_tag(std::uint64_t revision) {
   return std::string("\"r").append(std::to_string(revision)).append("\"");
+}
+
+Outcome<Session::Expected> expected_revision(const RequestHead& head) {
+  const auto header = head.header("if-match");
+  if (!header || *header == "*") return Session::Expected();
+  std::uint64_t revision = 0;
+  const bool quoted =
+      header->size() > 3 && header->size() < 22 && header->substr(0, 2) == "\"r" && header->back() == '"';
+  const char* const end = header->data() + header->size() - 1;
+  if (quoted) {
+    const auto [stop, error] = std::from_chars(header->data() + 2, end, revision);
+    if (error == std::errc{} && stop == end) return Session::Expected(revision);
+  }
+  return Problem{.kind = ProblemKind::kMalformedRequest,
+                 .detail = "If-Match must be one strong tag \"r<n>\", or *"};
 }
 
 Response session_response(const Session& session, const Document& document, int status) {

@@ -53,6 +53,9 @@ Response json_response(const protocol::JsonDocument& document, int status = 200)
 /// The session that the first capture names; a problem where there is none.
 Outcome<std::shared_ptr<Session>> session_of(Service& service, const Request& request);
 
+/// The revision that If-Match names: "r<number>"; none where it is absent or *.
+Outcome<Session::Expected> expected_revision(const RequestHead& head);
+
 /// The session document with its ETag.
 Response session_response(const Session& session, const Document& document, int status = 200);
 std::string revision_tag(std::uint64_t revision);

@@ -25,7 +25,9 @@ Response get_session(Service& service, const Request& request) {
 }
 
 Response delete_session(Service& service, const Request& request) {
-  if (auto removed = service.sessions.remove(request.captures.at(0)); !removed.ok())
+  const auto expected = expected_revision(request.head);
+  if (!expected.ok()) return problem_response(expected.problem(), request);
+  if (auto removed = service.sessions.remove(request.captures.at(0), expected.value()); !removed.ok())
     return problem_response(removed.problem(), request);
   return {.status = 204};
 }

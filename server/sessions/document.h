@@ -13,10 +13,14 @@
 
 namespace pointwright::server {
 
+/// The operations of a painting. Lists share them: appending copies none.
+using OperationList = std::vector<std::shared_ptr<const PaintOperation>>;
+
 /// One region as it was painted.
 struct Painting {
   std::size_t samples = 0;
-  std::shared_ptr<const std::vector<PaintOperation>> operations;
+  std::size_t vertices = 0;  ///< of all strokes
+  std::shared_ptr<const OperationList> operations;
 };
 
 struct Document {

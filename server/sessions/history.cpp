@@ -10,6 +10,22 @@ History::History(SurfaceState rest, std::uint64_t budget_bytes, Replay replay)
 }
 
 std::uint64_t History::memory() const {
+  return states_memory() + marks_memory();
+}
+
+std::uint64_t History::marks_memory() const {
+  // Edits of one painting follow each other and share its marks: a later painting has marks of its own.
+  std::uint64_t bytes = 0;
+  const Marks* counted = nullptr;
+  for (const auto& edit : edits_) {
+    if (edit->marks == nullptr || edit->marks.get() == counted) continue;
+    counted = edit->marks.get();
+    bytes += counted->size();
+  }
+  return bytes;
+}
+
+std::uint64_t History::states_memory() const {
   std::uint64_t bytes = 0;
   for (const auto& entry : states_) bytes += memory_of(entry.second);
   return bytes;
@@ -46,7 +62,8 @@ Result<void> History::move_head(std::size_t edit) {
 void History::trim() {
   // The state that is cheapest to lose goes first: replaying what it spans, weighed by how far from the head
   // it is. So the stored states thin out with their distance, and undoing the last edits stays immediate.
-  while (memory() > budget_bytes_) {
+  const std::uint64_t marks = marks_memory();
+  while (marks + states_memory() > budget_bytes_) {
     auto victim = states_.end();
     double least_cost = 0.0;
     for (auto it = std::next(states_.begin()); it != states_.end(); ++it) {

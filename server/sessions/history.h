@@ -25,7 +25,7 @@ class History {
   [[nodiscard]] std::size_t head() const { return head_; }
   [[nodiscard]] const EditList& edits() const { return edits_; }
   [[nodiscard]] const SurfaceState& current() const { return states_.at(head_); }
-  /// Bytes of the stored states.
+  /// Bytes of the stored states and of the recorded paintings.
   [[nodiscard]] std::uint64_t memory() const;
   [[nodiscard]] std::size_t stored_states() const { return states_.size(); }
 
@@ -40,6 +40,8 @@ class History {
 
  private:
   void trim();
+  [[nodiscard]] std::uint64_t states_memory() const;
+  [[nodiscard]] std::uint64_t marks_memory() const;
 
   std::uint64_t budget_bytes_;
   Replay replay_;

@@ -104,7 +104,7 @@ void Session::finish_building(Result<Hierarchy> built) {
   document.state = protocol::SessionState::kReady;
   document.surface = std::move(state);
   document.marks = std::make_shared<const Marks>(params_.cloud->size(), std::uint8_t{0});
-  const auto no_operations = std::make_shared<const std::vector<PaintOperation>>();
+  const auto no_operations = std::make_shared<const OperationList>();
   document.zero.operations = document.one.operations = no_operations;
   document.edits = std::make_shared<const EditList>();
   context_.begin_phase("ready", 1.0);
@@ -179,6 +179,24 @@ std::optional<std::string> Session::closed_reason() const {
 Outcome<Done> Session::check_open() const {
   if (closed_reason()) return Problem{.kind = ProblemKind::kNotFound, .detail = "the session was deleted"};
   return Done{};
+}
+
+Outcome<Done> Session::check_revision(Expected expected) const {
+  const std::uint64_t revision = document()->revision;
+  if (!expected || *expected == revision) return Done{};
+  return Problem{.kind = ProblemKind::kStaleRevision,
+                 .detail = "the session is at revision " + std::to_string(revision) + ", not " +
+                           std::to_string(*expected),
+                 .revision = revision};
+}
+
+Outcome<Done> Session::close_at(std::string reason, std::uint64_t revision) {
+  return on_strand([&, this]() -> Outcome<Done> {
+    if (auto open = check_open(); !open.ok()) return open;
+    if (auto current = check_revision(revision); !current.ok()) return current;
+    close(std::move(reason));
+    return Done{};
+  });
 }
 
 Outcome<SharedDocument> Session::ready_document() const {
@@ -290,7 +308,7 @@ Outcome<SurfaceState> Session::compute(const EditParams& params) {
   return after;
 }
 
-Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request) {
+Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request, Expected expected) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
   if (auto valid = validate(request.edit, *ready.value()->surface.surface); !valid)
@@ -304,8 +322,11 @@ Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request) {
     });
   if (!verdict->ok()) return *verdict;
   const std::lock_guard lock(preview_mutex_);
+  // Under the lock: a change that comes after this drops the pending preview.
+  if (auto current = check_revision(expected); !current.ok()) return current;
   const auto now = SteadyClock::now();
   if (request.sequence < newest_sequence_ && now - newest_sequence_time_ < kReorderWindow) return Done{};
+  if (request.sequence <= ended_sequence_ && now - ended_sequence_time_ < kReorderWindow) return Done{};
   newest_sequence_ = request.sequence;
   newest_sequence_time_ = now;
   pending_preview_ = std::make_shared<const protocol::PreviewRequest>(request);
@@ -350,14 +371,20 @@ Outcome<SharedFrame> Session::render_preview(const protocol::PreviewRequest& req
   });
 }
 
+void Session::end_drag() {
+  const std::lock_guard lock(preview_mutex_);
+  pending_preview_.reset();
+  if (newest_sequence_ == 0) return;
+  // Another drag may count anew, but what was overtaken by the end of this one must not be shown.
+  ended_sequence_ = newest_sequence_;
+  ended_sequence_time_ = SteadyClock::now();
+  newest_sequence_ = 0;
+}
+
 Outcome<Done> Session::end_preview() {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
-  {
-    const std::lock_guard lock(preview_mutex_);
-    pending_preview_.reset();
-    newest_sequence_ = 0;  // another drag may count anew
-  }
+  end_drag();
   return on_strand([this]() -> Outcome<Done> {
     if (shows_preview_) show_committed();
     return Done{};

@@ -27,10 +27,10 @@ struct SessionParams {
   std::uint64_t history_bytes = 0;
   std::size_t max_edits = 0;
   std::size_t max_operations = 0;
+  std::size_t max_painting_vertices = 1'000'000;
 };
 
-/// What a session computes with. `background` takes what lasts for seconds, `interactive` what a hand waits
-/// for.
+/// What a session computes with: `background` for what lasts for seconds, `interactive` for a waiting hand.
 struct SessionServices {
   ComputePool& interactive;
   ComputePool& background;
@@ -57,15 +57,18 @@ class Session : public std::enable_shared_from_this<Session> {
     SharedDocument document;
     std::size_t changed = 0;  ///< samples that joined or left a region
   };
-  /// Appends one operation to a region's painting. Problems: wrong state, too many operations.
-  Outcome<Painted> paint(RegionKind kind, const PaintOperation& operation);
+  /// The revision that a change was made for; none: any. Its problem: stale revision.
+  using Expected = std::optional<std::uint64_t>;
+  /// Appends one operation to a region's painting. Problems: wrong state, too many operations or vertices.
+  Outcome<Painted> paint(RegionKind kind, const PaintOperation& operation, Expected expected = {});
   /// Replaces a region's whole painting; none: clears it.
-  Outcome<Painted> replace_painting(RegionKind kind, std::vector<PaintOperation> operations);
+  Outcome<Painted> replace_painting(RegionKind kind, std::vector<PaintOperation> operations,
+                                    Expected expected = {});
 
   /// Asks for a preview to be shown. Returns once it is known to be possible; it is computed afterwards,
   /// unless a newer one replaces it before.
   /// Problems: wrong state, invalid edits, regions that are empty or meet
-  Outcome<Done> put_preview(const protocol::PreviewRequest& request);
+  Outcome<Done> put_preview(const protocol::PreviewRequest& request, Expected expected = {});
   /// Computes a preview's key frame without showing it to anyone.
   Outcome<SharedFrame> render_preview(const protocol::PreviewRequest& request, std::uint16_t attributes);
   /// Ends the drag: the committed state is shown again.
@@ -75,10 +78,10 @@ class Session : public std::enable_shared_from_this<Session> {
     SharedDocument document;
     std::shared_ptr<const RecordedEdit> record;
   };
-  /// Records an edit on top of `revision`. Problems: those of put_preview, a stale revision, too many edits.
-  Outcome<Committed> commit(const EditParams& params, std::uint64_t revision);
+  /// Records an edit. Problems: those of put_preview, a stale revision, too many edits.
+  Outcome<Committed> commit(const EditParams& params, Expected expected);
   /// Undo, redo, jump: keeps the first `edit` edits applied.
-  Outcome<SharedDocument> move_head(std::size_t edit);
+  Outcome<SharedDocument> move_head(std::size_t edit, Expected expected = {});
 
   /// The committed state with `level` valid; with t where the regions allow it.
   Outcome<Picture> committed_picture(std::uint32_t level, bool with_t);
@@ -97,6 +100,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// Ends the session: building is cancelled, streams end with the reason, changes are refused.
   void close(std::string reason);
+  /// The same, once the changes before it are done, and only at the expected revision.
+  Outcome<Done> close_at(std::string reason, std::uint64_t revision);
   [[nodiscard]] std::optional<std::string> closed_reason() const;
 
  private:
@@ -125,10 +130,13 @@ class Session : public std::enable_shared_from_this<Session> {
   void refresh_field();
   void show_field();
   Outcome<Done> check_open() const;
+  Outcome<Done> check_revision(Expected expected) const;
+  void end_drag();  // any thread
   Outcome<SharedField> ensure_field(std::uint32_t level, Blend blend);
   Outcome<Done> ensure_level(std::uint32_t level);
   Outcome<SurfaceState> compute(const EditParams& params);
-  Outcome<Painted> repaint(RegionKind kind, std::vector<PaintOperation> operations, bool append);
+  Outcome<Painted> repaint(RegionKind kind, std::vector<PaintOperation> operations, bool append,
+                           Expected expected);
   [[nodiscard]] std::optional<Outcome<Done>> known_verdict(const Document& document,
                                                            const EditParams& params) const;
   Outcome<SharedDocument> ready_document() const;  // any thread
@@ -174,18 +182,19 @@ class Session : public std::enable_shared_from_this<Session> {
   };
   std::optional<LastPreview> last_preview_;
 
-  mutable std::mutex
-      field_mutex_;  // guards field_key_, field_problem_ and field_ (written on the strand only)
+  mutable std::mutex field_mutex_;  // guards the next three, which only the strand writes
   std::optional<FieldKey> field_key_;
   std::optional<protocol::Problem> field_problem_;
   SharedField field_;
   std::atomic<bool> field_scheduled_{false};
 
-  std::mutex preview_mutex_;  // guards the pending preview
+  std::mutex preview_mutex_;  // guards the pending preview and the numbers of the drags
   std::shared_ptr<const protocol::PreviewRequest> pending_preview_;
   bool preview_scheduled_ = false;
   std::uint64_t newest_sequence_ = 0;
   std::chrono::steady_clock::time_point newest_sequence_time_;
+  std::uint64_t ended_sequence_ = 0;  // the last one of the drag before
+  std::chrono::steady_clock::time_point ended_sequence_time_;
 };
 
 }  // namespace pointwright::server

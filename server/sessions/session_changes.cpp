@@ -18,23 +18,33 @@ protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) 
   return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
 }
 
-}  // namespace
-
-Outcome<Session::Painted> Session::paint(RegionKind kind, const PaintOperation& operation) {
-  auto ready = ready_document();
-  if (!ready.ok()) return ready.problem();
-  return on_strand([&, this] { return repaint(kind, {operation}, true); });
+std::size_t vertices_of(const std::vector<PaintOperation>& operations) {
+  std::size_t count = 0;
+  for (const PaintOperation& operation : operations)
+    if (const auto* stroke = std::get_if<Stroke>(&operation.shape)) count += stroke->vertices.size();
+  return count;
 }
 
-Outcome<Session::Painted> Session::replace_painting(RegionKind kind, std::vector<PaintOperation> operations) {
+}  // namespace
+
+Outcome<Session::Painted> Session::paint(RegionKind kind, const PaintOperation& operation,
+                                         Expected expected) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
-  return on_strand([&, this] { return repaint(kind, std::move(operations), false); });
+  return on_strand([&, this] { return repaint(kind, {operation}, true, expected); });
+}
+
+Outcome<Session::Painted> Session::replace_painting(RegionKind kind, std::vector<PaintOperation> operations,
+                                                    Expected expected) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this] { return repaint(kind, std::move(operations), false, expected); });
 }
 
 Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOperation> operations,
-                                           bool append) {
+                                           bool append, Expected expected) {
   if (auto open = check_open(); !open.ok()) return open.problem();
+  if (auto current = check_revision(expected); !current.ok()) return current.problem();
   const auto begin = SteadyClock::now();
   const SharedDocument before = document();
   const Painting& painting = before->painting(kind);
@@ -44,6 +54,12 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
                    .detail = "the region has as many operations as a painting may have",
                    .limit = static_cast<double>(params_.max_operations),
                    .actual = static_cast<double>(kept + operations.size())};
+  const std::size_t vertices = (append ? painting.vertices : 0) + vertices_of(operations);
+  if (vertices > params_.max_painting_vertices)
+    return Problem{.kind = ProblemKind::kTooManySamples,
+                   .detail = "the strokes of the region have more vertices than a painting may have",
+                   .limit = static_cast<double>(params_.max_painting_vertices),
+                   .actual = static_cast<double>(vertices)};
   auto marks = std::make_shared<Marks>(*before->marks);
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
@@ -58,11 +74,13 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
     if ((*marks)[i] != (*before->marks)[i]) ++result.changed;
 
   Document after = *before;
-  auto list = std::make_shared<std::vector<PaintOperation>>();
+  auto list = std::make_shared<OperationList>();
   if (append) *list = *painting.operations;
-  list->insert(list->end(), std::make_move_iterator(operations.begin()),
-               std::make_move_iterator(operations.end()));
-  (kind == RegionKind::kZero ? after.zero : after.one).operations = std::move(list);
+  for (PaintOperation& operation : operations)
+    list->push_back(std::make_shared<const PaintOperation>(std::move(operation)));
+  Painting& painted = kind == RegionKind::kZero ? after.zero : after.one;
+  painted.operations = std::move(list);
+  painted.vertices = vertices;
   after.zero.samples = count_marked(*marks, RegionKind::kZero);
   after.one.samples = count_marked(*marks, RegionKind::kOne);
   after.marks = std::move(marks);
@@ -75,17 +93,13 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
   return result;
 }
 
-Outcome<Session::Committed> Session::commit(const EditParams& params, std::uint64_t revision) {
+Outcome<Session::Committed> Session::commit(const EditParams& params, Expected expected) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
   return on_strand([&, this]() -> Outcome<Committed> {
     if (auto open = check_open(); !open.ok()) return open.problem();
+    if (auto current = check_revision(expected); !current.ok()) return current.problem();
     const SharedDocument before = document();
-    if (before->revision != revision)
-      return Problem{.kind = ProblemKind::kStaleRevision,
-                     .detail = "the session is at revision " + std::to_string(before->revision) + ", not " +
-                               std::to_string(revision),
-                     .revision = before->revision};
     if (before->head >= params_.max_edits)
       return Problem{.kind = ProblemKind::kTooMany,
                      .detail = "the history holds as many edits as it may",
@@ -114,22 +128,19 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, std::uint6
     ++after.revision;
     publish(std::move(after));
     note_time("commit", begin);
-    {
-      const std::lock_guard lock(preview_mutex_);
-      pending_preview_.reset();
-      newest_sequence_ = 0;  // another drag may count anew
-    }
+    end_drag();
     show_committed();
     schedule_field();
     return Committed{.document = document(), .record = record};
   });
 }
 
-Outcome<SharedDocument> Session::move_head(std::size_t edit) {
+Outcome<SharedDocument> Session::move_head(std::size_t edit, Expected expected) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
   return on_strand([&, this]() -> Outcome<SharedDocument> {
     if (auto open = check_open(); !open.ok()) return open.problem();
+    if (auto current = check_revision(expected); !current.ok()) return current.problem();
     const SharedDocument before = document();
     if (edit > before->edits->size())
       return Problem{.kind = ProblemKind::kInvalidValue,

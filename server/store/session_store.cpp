@@ -49,15 +49,17 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
                    .detail = "the memory for sessions is used up",
                    .limit = static_cast<double>(memory_.total()),
                    .actual = static_cast<double>(memory_.held() + samples * kBytesPerSample + history)};
-  entry.session = Session::create({.id = random_id(),
-                                   .name = request.name.empty() ? cloud->document.name : request.name,
-                                   .cloud_id = request.cloud,
-                                   .cloud = cloud->cloud,
-                                   .hierarchy = request.params,
-                                   .history_bytes = history,
-                                   .max_edits = static_cast<std::size_t>(limits_.max_edits),
-                                   .max_operations = static_cast<std::size_t>(limits_.max_operations)},
-                                  services_);
+  entry.session =
+      Session::create({.id = random_id(),
+                       .name = request.name.empty() ? cloud->document.name : request.name,
+                       .cloud_id = request.cloud,
+                       .cloud = cloud->cloud,
+                       .hierarchy = request.params,
+                       .history_bytes = history,
+                       .max_edits = static_cast<std::size_t>(limits_.max_edits),
+                       .max_operations = static_cast<std::size_t>(limits_.max_operations),
+                       .max_painting_vertices = static_cast<std::size_t>(limits_.max_painting_vertices)},
+                      services_);
   entries_.push_back(entry);
   return entry.session;
 }
@@ -76,7 +78,9 @@ std::vector<std::shared_ptr<Session>> SessionStore::list() const {
   return sessions;
 }
 
-Outcome<Done> SessionStore::remove(const std::string& id) {
+Outcome<Done> SessionStore::remove(const std::string& id, Session::Expected expected) {
+  if (const auto session = expected ? find(id) : nullptr)
+    if (auto closed = session->close_at("the session was deleted", *expected); !closed.ok()) return closed;
   Entry removed;
   {
     const std::lock_guard lock(mutex_);

@@ -25,8 +25,9 @@ class SessionStore {
                                            const protocol::CreateSessionRequest& request);
   [[nodiscard]] std::shared_ptr<Session> find(const std::string& id) const;
   [[nodiscard]] std::vector<std::shared_ptr<Session>> list() const;  ///< oldest first
-  /// Problem: not found.
-  Outcome<Done> remove(const std::string& id);
+  /// Removes a session and ends it, at the expected revision where one is given.
+  /// Problems: not found, stale revision
+  Outcome<Done> remove(const std::string& id, Session::Expected expected = {});
   /// Ends all sessions: the server stops.
   void close_all(const std::string& reason);
 

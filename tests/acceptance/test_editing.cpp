@@ -243,6 +243,73 @@ TEST_CASE(
   CHECK(results.size() == 1);
 }
 
+TEST_CASE("every change can be made to depend on the revision that it was made for") {
+  Daemon daemon;
+  const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(30))).json()["id"]);
+  const std::string stale = "If-Match: \"r7\"\r\n";
+  const std::string any = "If-Match: *\r\n";
+  const std::string zero = session + "/regions/zero";
+  const std::string preview = translation(0.1, R"(,"sequence":1)");
+  REQUIRE(daemon.ask("POST", session + "/regions/one/operations", kRight).status == 200);
+  struct Change {
+    std::string method, target, body;
+    int status;
+  };
+  for (const Change& change :
+       {Change{"POST", zero + "/operations", kLeft, 200}, Change{"PUT", session + "/preview", preview, 204},
+        Change{"POST", session + "/edits", translation(0.1), 201},
+        Change{"PUT", session + "/head", R"({"edit":0})", 200},
+        Change{"PUT", zero, R"({"operations":[]})", 200}, Change{"DELETE", zero, "", 200},
+        Change{"DELETE", session, "", 204}}) {
+    const std::string now = daemon.get(session).headers.at("etag");
+    const Reply refused = daemon.ask(change.method, change.target, change.body, stale);
+    CHECK_MESSAGE(refused.status == 412, change.method, " ", change.target);
+    CHECK(refused.json().value("type", "") == "/problems/stale-revision");
+    CHECK(daemon.ask(change.method, change.target, change.body, "If-Match: W/\"r1\"\r\n").status == 400);
+    CHECK(daemon.get(session).headers.at("etag") == now);
+    const std::string matching = change.method == "PUT" ? any : "If-Match: " + now + "\r\n";
+    CHECK_MESSAGE(daemon.ask(change.method, change.target, change.body, matching).status == change.status,
+                  change.method, " ", change.target);
+  }
+  CHECK(daemon.get(session).status == 404);
+}
+
+TEST_CASE("a painting holds as many vertices as the limit says") {
+  Daemon daemon({"--max-painting-vertices", "5"});
+  CHECK(daemon.get("/v1/info").json()["limits"]["max_painting_vertices"] == 5);
+  const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(20))).json()["id"]);
+  const std::string stroke =
+      R"({"mode":"add","shape":{"type":"stroke","vertices":[[0,0,0],[0,1,0],[1,1,0]],"radius":0.05}})";
+  const std::string zero = session + "/regions/zero";
+  CHECK(daemon.ask("POST", zero + "/operations", stroke).status == 200);
+  const Reply refused = daemon.ask("POST", zero + "/operations", stroke);
+  CHECK(refused.status == 413);
+  CHECK(refused.json()["limit"] == 5);
+  CHECK(refused.json()["actual"] == 6);
+  CHECK(daemon.ask("PUT", zero, R"({"operations":[)" + stroke + "]}").status == 200);
+  CHECK(daemon.ask("PUT", zero, R"({"operations":[)" + stroke + "," + stroke + "]}").status == 413);
+  CHECK(daemon.get(zero).json()["operations"].size() == 1);
+}
+
+TEST_CASE("what was deleted is given back to the system") {
+  Daemon daemon;
+  const std::size_t before = daemon.resident_kilobytes();
+  const std::string file = file_of(wavy_sheet(300));
+  for (int round = 0; round < 2; ++round) {
+    const Reply cloud = daemon.upload(file);
+    const std::string session = daemon.open_session(cloud.json()["id"]);
+    REQUIRE(daemon.ask("POST", session + "/regions/zero/operations", kLeft).status == 200);
+    REQUIRE(daemon.ask("POST", session + "/regions/one/operations", kRight).status == 200);
+    REQUIRE(daemon.ask("POST", session + "/edits", translation(0.1), "If-Match: *\r\n").status == 201);
+    CHECK(daemon.get(session + "/samples").status == 200);
+    CHECK(daemon.ask("DELETE", session).status == 204);
+    CHECK(daemon.ask("DELETE", cloud.headers.at("location")).status == 204);
+  }
+  for (int i = 0; i < 300 && daemon.resident_kilobytes() > before + 32 * 1024; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  CHECK(daemon.resident_kilobytes() < before + 32 * 1024);
+}
+
 TEST_CASE("clients that are cut off in mid-stream leave nothing behind") {
   Daemon daemon;
   const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(40))).json()["id"]);

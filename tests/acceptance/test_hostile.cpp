@@ -77,6 +77,7 @@ TEST_CASE("degenerate clouds are edited or refused, never crashed on") {
     line += std::to_string(i) + " 0 0\n";
     same += "1 2 3\n";
   }
+  int edits = 0;
   for (const std::string& cloud : {std::string("0 0 0\n"), std::string("0 0 0\n1 0 0\n"), line, same}) {
     const Reply uploaded = daemon.upload(cloud, "text/plain");
     CHECK(uploaded.status < 500);
@@ -92,14 +93,27 @@ TEST_CASE("degenerate clouds are edited or refused, never crashed on") {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
     CHECK(state != "building");
-    daemon.ask("POST", path + "/regions/zero/operations", R"({"mode":"add","shape":{"type":"all"}})");
-    const Reply edit = daemon.ask("POST", path + "/edits",
-                                  R"({"level":0,"deformation":{"type":"translation","vector":[0,0,1]}})",
-                                  "If-Match: \"r1\"\r\n");
-    CHECK(edit.status < 500);
+    if (state == "ready") {
+      // The zero-region about the first sample, the one-region everything else.
+      const std::string ball = R"({"shape":{"type":"sphere","center":[0,0,0],"radius":0.5},"mode":)";
+      daemon.ask("POST", path + "/regions/zero/operations", ball + R"("add"})");
+      daemon.ask("POST", path + "/regions/one/operations", R"({"mode":"add","shape":{"type":"all"}})");
+      daemon.ask("POST", path + "/regions/one/operations", ball + R"("remove"})");
+      Reply edit = daemon.ask("POST", path + "/edits",
+                              R"({"level":0,"deformation":{"type":"translation","vector":[0,0,1]}})",
+                              "If-Match: *\r\n");
+      if (edit.status != 201) {
+        CHECK(edit.status >= 400);
+        CHECK(edit.status < 500);
+        CHECK(edit.headers["content-type"] == "application/problem+json");
+        CHECK(edit.json().value("type", "").rfind("/problems/", 0) == 0);
+      }
+      edits += edit.status == 201 ? 1 : 0;
+    }
     CHECK(daemon.get(path + "/samples?format=xyz").body.find("nan") == std::string::npos);
     CHECK(daemon.is_alive());
   }
+  CHECK(edits > 0);
 }
 
 TEST_CASE("mutated files are accepted whole or refused, and the daemon lives") {

@@ -96,6 +96,13 @@ std::vector<PaintOperation> operations() {
            .steal = true}};
 }
 
+std::vector<std::shared_ptr<const PaintOperation>> shared_operations() {
+  std::vector<std::shared_ptr<const PaintOperation>> shared;
+  for (const PaintOperation& each : operations())
+    shared.push_back(std::make_shared<const PaintOperation>(each));
+  return shared;
+}
+
 std::vector<EditRecord> edits() {
   return {{.index = 1,
            .edit = {.level = 0, .deformation = Translation{.vector = Vec3d(0.0, 0.02, 0.0)}},
@@ -157,7 +164,7 @@ std::vector<File> document_files() {
       {"session", to_json(ready())},
       {"session-failed", to_json(failed())},
       {"session-list", session_list({building().summary, ready().summary})},
-      {"painting", painting_document(RegionKind::kZero, 120000, operations())},
+      {"painting", painting_document(RegionKind::kZero, 120000, shared_operations())},
       {"edit-list", edit_list(1, edits())},
       {"problem-invalid", to_json(invalid())},
       {"problem-stale", to_json(stale())},

@@ -7,7 +7,7 @@ using namespace pointwright::server;
 
 namespace {
 
-/// A surface of one sample whose x tells the state; 28 bytes.
+/// A surface of one sample whose x tells the state; 24 bytes.
 SurfaceState state_at(float x) {
   auto surface = std::make_shared<MultiresSurface>();
   surface->levels.resize(1);
@@ -41,6 +41,25 @@ void push_many(History& history, std::size_t count) {
 }
 
 }  // namespace
+
+TEST_CASE("paintings count once each, however many edits share them") {
+  Steps steps;
+  History history(state_at(0), 24 * 4 + 250, steps.replay());
+  const auto push = [&](const std::shared_ptr<const Marks>& marks) {
+    auto edit = std::make_shared<RecordedEdit>();
+    edit->index = history.head() + 1;
+    edit->marks = marks;
+    history.push(edit, state_at(x_of(history.current()) + static_cast<float>(edit->index)));
+  };
+  const auto first = std::make_shared<const Marks>(100);
+  push(first);
+  push(first);
+  CHECK(history.memory() == 24 * 3 + 100);
+  push(std::make_shared<const Marks>(100));
+  CHECK(history.memory() == 24 * 4 + 200);
+  push(std::make_shared<const Marks>(100));
+  CHECK(history.stored_states() < 5);  // what paintings take is not there for states
+}
 
 TEST_CASE("with room for all states nothing is replayed") {
   Steps steps;

@@ -342,6 +342,45 @@ TEST_CASE("a preview that was overtaken by a later one of the same drag is not s
   CHECK(session->display().picture().sequence == 8);
 }
 
+TEST_CASE("a preview that the end of its drag overtook is not shown over the committed state") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  REQUIRE(session->put_preview({.edit = lift(0.2), .sequence = 8}).ok());
+  const std::uint64_t revision = session->document()->revision;
+  commit(*session, lift(0.2));
+  REQUIRE(session->put_preview({.edit = lift(0.1), .sequence = 7}).ok());
+  REQUIRE(session->put_preview({.edit = lift(0.2), .sequence = 8}).ok());
+  // The last one may come first after its commit: the revision that it was made for tells.
+  CHECK(kind_of(session->put_preview({.edit = lift(0.2), .sequence = 9}, revision)) ==
+        ProblemKind::kStaleRevision);
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  CHECK(session->display().picture().sequence == 0);
+  REQUIRE(session->put_preview({.edit = lift(0.3), .sequence = 10}, revision + 1).ok());
+  CHECK(comes_true([&] { return session->display().picture().sequence == 10; }));
+}
+
+TEST_CASE("the base stays editable wherever the finest level was moved to") {
+  Workshop workshop;
+  const auto session = Session::create(
+      {.id = "AAAAAAAAAAAAAAAAAAAAAA",
+       .name = "sheet",
+       .cloud_id = "BBBBBBBBBBBBBBBBBBBBBB",
+       .cloud = workshop.cloud,
+       .hierarchy = {.scales = {0.0002F}},
+       .history_bytes = 1ULL << 30U,
+       .max_edits = 50,
+       .max_operations = 5},
+      {.interactive = workshop.interactive, .background = workshop.background, .build = build_hierarchy});
+  REQUIRE(comes_true([&] { return session->document()->state == protocol::SessionState::kReady; }));
+  REQUIRE(session->paint(RegionKind::kZero, left_of(0.2)).ok());
+  REQUIRE(session->paint(RegionKind::kOne, right_of(0.8)).ok());
+  commit(*session,
+         lift(2.2, 1));  // more than one and a half diagonals: the scale's fraction falls below 1e-4
+  commit(*session, lift(0.1, 0));
+  CHECK(session->document()->head == 2);
+  CHECK(session->document()->surface.reports->front().scale > 0.0F);
+}
+
 TEST_CASE("ending a preview shows the committed state again") {
   Workshop workshop;
   const auto session = workshop.painted();

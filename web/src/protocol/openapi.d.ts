@@ -650,7 +650,7 @@ export interface components {
         };
         Edit: components["schemas"]["EditMembers"];
         Preview: components["schemas"]["EditMembers"] & {
-            /** @description The sender's own number; the frame that shows this preview carries it */
+            /** @description The sender's own number, rising from preview to preview; the frame that shows this preview carries it. Of requests that overtook each other the highest is shown, and none of a drag that has ended. */
             sequence: number;
         };
         EditRecord: {
@@ -785,6 +785,8 @@ export interface components {
         SessionId: components["schemas"]["Id"];
         /** @description zero stays where it is, one moves in full */
         Region: "zero" | "one";
+        /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
+        IfMatch: string;
         IfNoneMatch: string;
         /** @description What a frame carries beside the positions, as far as the cloud has it */
         Attributes: ("normal" | "t" | "detail" | "color" | "marks" | "ids" | "radius")[];
@@ -1202,7 +1204,10 @@ export interface operations {
     deleteSession: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
+                "If-Match"?: components["parameters"]["IfMatch"];
+            };
             path: {
                 session: components["parameters"]["SessionId"];
             };
@@ -1212,6 +1217,7 @@ export interface operations {
         responses: {
             204: components["responses"]["Done"];
             404: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1246,7 +1252,10 @@ export interface operations {
     replacePainting: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
+                "If-Match"?: components["parameters"]["IfMatch"];
+            };
             path: {
                 session: components["parameters"]["SessionId"];
                 /** @description zero stays where it is, one moves in full */
@@ -1264,6 +1273,7 @@ export interface operations {
             400: components["responses"]["Problem"];
             404: components["responses"]["Problem"];
             409: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
@@ -1273,7 +1283,10 @@ export interface operations {
     clearPainting: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
+                "If-Match"?: components["parameters"]["IfMatch"];
+            };
             path: {
                 session: components["parameters"]["SessionId"];
                 /** @description zero stays where it is, one moves in full */
@@ -1286,13 +1299,17 @@ export interface operations {
             200: components["responses"]["Session"];
             404: components["responses"]["Problem"];
             409: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
             default: components["responses"]["Problem"];
         };
     };
     paint: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
+                "If-Match"?: components["parameters"]["IfMatch"];
+            };
             path: {
                 session: components["parameters"]["SessionId"];
                 /** @description zero stays where it is, one moves in full */
@@ -1320,6 +1337,7 @@ export interface operations {
             400: components["responses"]["Problem"];
             404: components["responses"]["Problem"];
             409: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
@@ -1329,7 +1347,10 @@ export interface operations {
     preview: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
+                "If-Match"?: components["parameters"]["IfMatch"];
+            };
             path: {
                 session: components["parameters"]["SessionId"];
             };
@@ -1345,6 +1366,7 @@ export interface operations {
             400: components["responses"]["Problem"];
             404: components["responses"]["Problem"];
             409: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
@@ -1433,7 +1455,7 @@ export interface operations {
         parameters: {
             query?: never;
             header: {
-                /** @description The revision that the edit was made for, as the session's ETag says it */
+                /** @description The revision that the edit was made for, as the session's ETag says it; or * for any */
                 "If-Match": string;
             };
             path: {
@@ -1451,7 +1473,6 @@ export interface operations {
             201: {
                 headers: {
                     "X-Request-Id": components["headers"]["RequestId"];
-                    Location: components["headers"]["Location"];
                     ETag: components["headers"]["ETag"];
                     [name: string]: unknown;
                 };
@@ -1473,7 +1494,10 @@ export interface operations {
     moveHead: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
+                "If-Match"?: components["parameters"]["IfMatch"];
+            };
             path: {
                 session: components["parameters"]["SessionId"];
             };
@@ -1489,6 +1513,7 @@ export interface operations {
             400: components["responses"]["Problem"];
             404: components["responses"]["Problem"];
             409: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
