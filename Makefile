@@ -68,7 +68,7 @@ demo: ## edit the Stanford dragon through the public HTTP API; pictures and resu
 serve: ## run the editor on http://$(HOST):$(PORT) until Ctrl-C
 	@.ci/setup build web
 	@$(MAKE) --no-print-directory sample viewer
-	@echo "serve: open http://$(HOST):$(PORT)/ in a browser; Ctrl-C ends it"
+	@echo "serve: open the address below in a browser; Ctrl-C ends it"
 	@exec $(daemon) --host $(HOST) --port $(PORT) --web web/dist --sample "$(dragon)=Stanford dragon"
 
 test: ## every check and every test; the last line counts them (LANES="format cpp" for some)
