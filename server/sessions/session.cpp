@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "engine/core/median.h"
 #include "engine/core/parallel.h"
 #include "engine/spatial/splat_radius.h"
 
@@ -21,13 +22,6 @@ protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) 
   const Box3f box = bounds_of(position);
   if (box.is_empty()) return {.min = origin, .max = origin};
   return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
-}
-
-double median_of(std::vector<float> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 float detail_range_of(const SurfaceState& state) {
@@ -92,7 +86,7 @@ void Session::finish_building(Result<Hierarchy> built) {
     radius->push_back(protocol::to_bfloat16(value));
   rest_.splat_radius = std::move(radius);
   rest_.spacing = std::move(hierarchy.spacing);
-  median_spacing_ = median_of(rest_.spacing);
+  median_spacing_ = median(rest_.spacing);
   SurfaceState state{
       .surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
       .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),

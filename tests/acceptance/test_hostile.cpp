@@ -37,6 +37,13 @@ void check_refused(Daemon& daemon, const std::string& bytes, const std::string& 
   CHECK_MESSAGE(daemon.is_alive(), what);
 }
 
+/// The head of an upload that announces `bytes`, for those who send less or slower.
+std::string upload_head(std::size_t bytes) {
+  return "POST /v1/clouds HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+         "application/x-ply\r\nContent-Length: " +
+         std::to_string(bytes) + "\r\n\r\n";
+}
+
 }  // namespace
 
 TEST_CASE("bad uploads each get a problem, nothing is stored and a good one works right after") {
@@ -179,9 +186,7 @@ TEST_CASE("uploads that are announced and never sent take no room from others an
   Daemon daemon({"--body-grace-ms", "2000", "--least-body-rate", "1000000"});
   const std::string session =
       daemon.open_session(daemon.upload(file_of(wavy_sheet(20), CloudFormat::kPly)).json()["id"]);
-  const std::string head =
-      "POST /v1/clouds HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/x-ply\r\nContent-Length: "
-      "1073741824\r\n\r\n";
+  const std::string head = upload_head(1073741824);
   RawClient silent(daemon.port());
   RawClient stalled(daemon.port());
   const auto begin = std::chrono::steady_clock::now();
@@ -201,9 +206,7 @@ TEST_CASE("uploads that fill the memory for uploads leave documents theirs") {
   Daemon daemon({"--max-upload-memory", "1000000"});
   const std::string session =
       daemon.open_session(daemon.upload(file_of(wavy_sheet(20), CloudFormat::kPly)).json()["id"]);
-  const std::string head =
-      "POST /v1/clouds HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/x-ply\r\nContent-Length: "
-      "1000000\r\n\r\n";
+  const std::string head = upload_head(1000000);
   RawClient first(daemon.port());
   first.send(head + std::string(999'999, '0'));
   Reply refused;

@@ -1,7 +1,7 @@
 // The editor in a real browser against a real daemon: every test looks at the server's state, the picture, or both.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import { waitForIdle } from "../../web/scripts/browser.mjs";
 import {
   canvasPlace,
@@ -10,32 +10,17 @@ import {
   createSession,
   drag,
   json,
-  openBrowser,
+  open,
+  service,
   sessionUrl,
-  startService,
+  startAroundTests,
+  timeout,
   waitForRevision,
   waitMs,
 } from "./support.mjs";
 
 const frontCamera = { position: [0, 0, 6], target: [0, 0, 0], up: [0, 1, 0] };
-const timeout = 600_000;
-
-let service;
-let browser;
-let open;
-
-before(
-  async () => {
-    service = await startService();
-    ({ browser, open } = await openBrowser());
-  },
-  { timeout },
-);
-
-after(async () => {
-  await browser?.close();
-  await service?.stop();
-});
+startAroundTests();
 
 /** A page with a session of its own, seen from the front, at rest. */
 async function openEditor(samples = 12_000) {

@@ -1,6 +1,6 @@
 // The page of the clouds, refusals, and what assistive technology meets.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { test } from "node:test";
 import { waitForIdle } from "../../web/scripts/browser.mjs";
 import {
   axePath,
@@ -8,29 +8,15 @@ import {
   checkTroubles,
   createSession,
   json,
-  openBrowser,
+  open,
+  service,
   sessionUrl,
-  startService,
+  startAroundTests,
+  timeout,
   waitMs,
 } from "./support.mjs";
 
-const timeout = 600_000;
-let service;
-let browser;
-let open;
-
-before(
-  async () => {
-    service = await startService();
-    ({ browser, open } = await openBrowser());
-  },
-  { timeout },
-);
-
-after(async () => {
-  await browser?.close();
-  await service?.stop();
-});
+startAroundTests();
 
 async function seriousFindings(page) {
   // Through the debugger, as the content security policy lets no script be added.

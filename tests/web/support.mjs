@@ -1,7 +1,9 @@
 // What the browser tests share: a synthetic cloud, a daemon of their own with the built viewer, a page that is watched.
+
 import { existsSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, resolve } from "node:path";
+import { after, before } from "node:test";
 import { fileURLToPath } from "node:url";
 import { startDaemon } from "../../web/demo/daemon.mjs";
 import { launchBrowser, waitForIdle } from "../../web/scripts/browser.mjs";
@@ -38,7 +40,7 @@ export async function json(url, init) {
   return response.json();
 }
 
-export async function startService() {
+async function startService() {
   const dist = resolve(root, "web/dist");
   if (!existsSync(resolve(dist, "index.html"))) throw new Error("web/dist is not built");
   return startDaemon(["--web", dist]);
@@ -66,7 +68,7 @@ export async function createSession(service, count = 12_000) {
 }
 
 /** The browser, and pages that collect what went wrong on them. */
-export async function openBrowser() {
+async function openBrowser() {
   const browser = await launchBrowser();
   const open = async (url, size = { width: 900, height: 620 }) => {
     const page = await browser.newPage({ viewport: size, reducedMotion: "reduce", acceptDownloads: true });
@@ -163,4 +165,26 @@ export async function checkTroubles(page, troubles) {
   const violations = await page.evaluate(() => globalThis.violations);
   const all = [...troubles, ...violations];
   if (all.length > 0) throw new Error(`the page reported: ${all.join("; ")}`);
+}
+
+/** What a test may take, on slow machines too. */
+export const timeout = 600_000;
+/** The daemon, and what opens a page, while a file's tests run. */
+export let service;
+export let open;
+
+/** Starts a daemon and a browser before this file's tests, and ends them afterwards. */
+export function startAroundTests() {
+  let browser;
+  before(
+    async () => {
+      service = await startService();
+      ({ browser, open } = await openBrowser());
+    },
+    { timeout },
+  );
+  after(async () => {
+    await browser?.close();
+    await service?.stop();
+  });
 }
