@@ -21,7 +21,7 @@ function(pointwright_add_kernels target source)
     # -Wno-psabi: vectors are never passed between translation units. A source's options follow its target's, so
     # they win over the baseline.
     set_source_files_properties(${unit} TARGET_DIRECTORY ${target} PROPERTIES
-      COMPILE_OPTIONS "-Wno-psabi;${options_${variant}}")
+      SKIP_PRECOMPILE_HEADERS ON COMPILE_OPTIONS "-Wno-psabi;${options_${variant}}")
     target_sources(${target} PRIVATE ${unit})
   endforeach()
 endfunction()

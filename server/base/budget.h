@@ -4,24 +4,42 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <utility>
 
 namespace pointwright::server {
 
 /// Thread-safe.
 class Budget {
+  struct State;
+
  public:
   explicit Budget(std::uint64_t total) : state_(std::make_shared<State>(total)) {}
 
+  /// A part of the budget, given back when it is destroyed.
+  class Hold {
+   public:
+    Hold(std::shared_ptr<State> state, std::uint64_t amount) : state_(std::move(state)), amount_(amount) {}
+    Hold(const Hold&) = delete;
+    Hold& operator=(const Hold&) = delete;
+    ~Hold() { shrink_to(0); }
+    /// Gives back all but `amount`; nothing where that much is not held.
+    void shrink_to(std::uint64_t amount) {
+      const std::lock_guard lock(state_->mutex);
+      if (amount >= amount_) return;
+      state_->held -= amount_ - amount;
+      amount_ = amount;
+    }
+
+   private:
+    std::shared_ptr<State> state_;
+    std::uint64_t amount_;  // guarded by the state's mutex
+  };
+
   /// Holds `amount` until the last copy of the returned handle is gone; null where that much is not left.
-  [[nodiscard]] std::shared_ptr<void> hold(std::uint64_t amount) {
-    const std::lock_guard lock(state_->mutex);
-    if (amount > state_->total - state_->held) return nullptr;
-    state_->held += amount;
-    return {state_.get(), [state = state_, amount](void*) {
-              const std::lock_guard release_lock(state->mutex);
-              state->held -= amount;
-            }};
-  }
+  [[nodiscard]] std::shared_ptr<Hold> hold(std::uint64_t amount) { return hold(amount, false); }
+  /// As hold(), but where nothing else is held any amount is granted: what is larger than the whole budget
+  /// gets its turn alone.
+  [[nodiscard]] std::shared_ptr<Hold> hold_or_alone(std::uint64_t amount) { return hold(amount, true); }
   [[nodiscard]] std::uint64_t held() const {
     const std::lock_guard lock(state_->mutex);
     return state_->held;
@@ -35,6 +53,17 @@ class Budget {
     std::mutex mutex;  // guards held
     std::uint64_t held = 0;
   };
+
+  [[nodiscard]] std::shared_ptr<Hold> hold(std::uint64_t amount, bool even_beyond) {
+    {
+      const std::lock_guard lock(state_->mutex);
+      const bool fits = state_->held <= state_->total && amount <= state_->total - state_->held;
+      if (!fits && !(even_beyond && state_->held == 0)) return nullptr;
+      state_->held += amount;
+    }
+    return std::make_shared<Hold>(state_, amount);
+  }
+
   std::shared_ptr<State> state_;
 };
 

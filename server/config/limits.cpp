@@ -30,6 +30,9 @@ constexpr std::array kTable = {
               "bytes of all uploads that have come in and are not yet clouds"},
     LimitInfo{"max_json_memory", &Limits::max_json_memory, 1U << 20U, kTebi,
               "bytes of all JSON bodies that have come in and are not yet answered"},
+    LimitInfo{"max_answer_memory", &Limits::max_answer_memory, 1U << 20U, kTebi,
+              "bytes of all files and frames that are made or wait for slow readers; a larger one gets its "
+              "turn alone"},
     LimitInfo{"max_head_bytes", &Limits::max_head_bytes, 1024, 1U << 20U, "bytes of a request's head"},
     LimitInfo{"max_headers", &Limits::max_headers, 8, 1000, "headers of a request"},
     LimitInfo{"max_path_bytes", &Limits::max_path_bytes, 128, 8192, "bytes of a request's path"},

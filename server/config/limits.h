@@ -26,6 +26,7 @@ struct Limits {
   std::uint64_t max_decoders = 2;
   std::uint64_t max_upload_memory = 2ULL << 30U;
   std::uint64_t max_json_memory = 128ULL << 20U;
+  std::uint64_t max_answer_memory = 1ULL << 30U;
   std::uint64_t max_head_bytes = 32 * 1024;
   std::uint64_t max_headers = 64;
   std::uint64_t max_path_bytes = 512;

@@ -1,16 +1,31 @@
 #pragma once
-// Clouds as files to download.
+// Clouds as files to download, and single frames.
 
 #include "server/handlers/query.h"
 #include "server/handlers/service.h"
 
 namespace pointwright::server {
 
+inline constexpr std::string_view kFrameMediaType = "application/vnd.pointwright.frame";
+
 /// ply, draco, xyz.
 const std::vector<Format>& cloud_file_formats();
 
-/// The cloud in the caller's order, written on the background pool; 304 where the tag matches.
-Response cloud_file_response(Service& service, const Request& request, std::shared_ptr<const Cloud> cloud,
-                             const Format& format, const std::string& name, const std::string& etag);
+struct CloudFile {
+  Format format;
+  std::string name;
+  std::string etag;
+};
+/// The cloud that `make` gives, as a file in the caller's order. Made and written on the background pool,
+/// within the memory for answers, of which the file's bytes hold their part until they are sent.
+/// `cloud_bytes`: memory_of() that cloud
+/// Problems: overloaded, not acceptable (the format cannot hold the cloud)
+Response cloud_file_response(Service& service, const Request& request,
+                             const std::function<std::shared_ptr<const Cloud>()>& make,
+                             std::uint64_t cloud_bytes, const CloudFile& file);
+
+/// A frame as an answer that holds its part of the memory for answers until it is sent.
+/// Problem: overloaded
+Outcome<Response> frame_answer(Service& service, const SharedFrame& frame);
 
 }  // namespace pointwright::server

@@ -44,8 +44,8 @@ Response upload_cloud(Service& service, const Request& request) {
   const auto import = import_request(request.head);
   if (!import.ok()) return problem_response(import.problem(), request);
   const auto begin = std::chrono::steady_clock::now();
-  const auto cloud = import_cloud(service.clouds, service.decode, service.config.limits, request.body_bytes(),
-                                  import.value());
+  const auto cloud = import_cloud(service.clouds, service.decode, service.background, service.config.limits,
+                                  request.body_bytes(), import.value());
   if (!cloud.ok()) return problem_response(cloud.problem(), request);
   Response response = json_response(protocol::to_json(cloud.value()->document), 201);
   response.timings.emplace_back(
@@ -69,7 +69,9 @@ Response get_cloud_data(Service& service, const Request& request) {
   const auto format = negotiated_format(request.head, cloud_file_formats());
   if (!format.ok()) return problem_response(format.problem(), request);
   const std::string etag = etag_of({cloud->document.sha256, format.value().name});
-  return cloud_file_response(service, request, cloud->cloud, format.value(), cloud->document.name, etag);
+  if (is_unchanged(request.head, etag)) return not_modified(etag);
+  return cloud_file_response(service, request, [&cloud] { return cloud->cloud; }, memory_of(*cloud->cloud),
+                             {.format = format.value(), .name = cloud->document.name, .etag = etag});
 }
 
 Response delete_cloud(Service& service, const Request& request) {

@@ -1,4 +1,5 @@
 #include "protocol/frames/frame.h"
+#include "server/handlers/cloud_file.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/query.h"
 
@@ -30,11 +31,12 @@ Response post_preview(Service& service, const Request& request) {
   const auto bits = session.value()->available_attributes(attributes.value());
   const auto frame = session.value()->render_preview(preview.value(), bits);
   if (!frame.ok()) return problem_response(frame.problem(), request);
-  Response response{.content_type = "application/vnd.pointwright.frame",
-                    .body = SharedBytes{.owner = frame.value(), .bytes = *frame.value()}};
+  auto answer = frame_answer(service, frame.value());
+  if (!answer.ok()) return problem_response(answer.problem(), request);
+  Response& response = answer.value();
   response.timings.emplace_back(
       "deform", std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-  return response;
+  return std::move(response);
 }
 
 Response delete_preview(Service& service, const Request& request) {

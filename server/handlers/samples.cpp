@@ -6,12 +6,10 @@
 namespace pointwright::server {
 namespace {
 
-constexpr std::string_view kFrameType = "application/vnd.pointwright.frame";
-
 const std::vector<Format>& sample_formats() {
   static const std::vector<Format> formats = [] {
     std::vector<Format> all = cloud_file_formats();
-    all.push_back({"frame", kFrameType, ".pwfr"});
+    all.push_back({"frame", kFrameMediaType, ".pwfr"});
     return all;
   }();
   return formats;
@@ -21,22 +19,44 @@ std::string revision_name(std::uint64_t revision) {
   return std::string(1, 'r').append(std::to_string(revision));
 }
 
+std::string frame_tag(std::uint64_t revision, std::uint32_t level, std::uint16_t attributes) {
+  return etag_of({revision_name(revision), "frame", std::to_string(level), std::to_string(attributes)});
+}
+
 Response frame_response(Service& service, const Request& request, Session& session, std::uint32_t level,
                         std::uint16_t attributes) {
+  if (const std::string etag = frame_tag(session.document()->revision, level, attributes);
+      is_unchanged(request.head, etag))
+    return not_modified(etag);
   const auto picture = session.committed_picture(level, (attributes & protocol::kFrameT) != 0);
   if (!picture.ok()) return problem_response(picture.problem(), request);
-  const std::string etag = etag_of(
-      {revision_name(picture.value().revision), "frame", std::to_string(level), std::to_string(attributes)});
-  if (is_unchanged(request.head, etag)) return not_modified(etag);
   const auto frame = computed(service.interactive, [&] {
     return encode_picture(session.display().layout(), picture.value(), session.cloud(), level, attributes);
   });
   if (!frame.ok()) return problem_response(frame.problem(), request);
-  Response response{.content_type = std::string(kFrameType),
-                    .body = SharedBytes{.owner = frame.value(), .bytes = *frame.value()}};
-  return response.with_header("ETag", etag)
+  auto answer = frame_answer(service, frame.value());
+  if (!answer.ok()) return problem_response(answer.problem(), request);
+  return answer.value()
+      .with_header("ETag", frame_tag(picture.value().revision, level, attributes))
       .with_header("Cache-Control", "no-cache")
       .with_header("Vary", "Accept");
+}
+
+std::string file_tag(std::uint64_t revision, const Format& format, std::uint32_t level) {
+  return etag_of({revision_name(revision), format.name, std::to_string(level)});
+}
+
+Response file_response(Service& service, const Request& request, Session& session, std::uint32_t level,
+                       const Format& format) {
+  if (const std::string etag = file_tag(session.document()->revision, format, level);
+      is_unchanged(request.head, etag))
+    return not_modified(etag);
+  const auto picture = session.committed_picture(level, false);
+  if (!picture.ok()) return problem_response(picture.problem(), request);
+  return cloud_file_response(
+      service, request, [&] { return session.edited_cloud(picture.value(), level); },
+      memory_of(session.cloud()),
+      {.format = format, .name = session.name(), .etag = file_tag(picture.value().revision, format, level)});
 }
 
 }  // namespace
@@ -75,12 +95,7 @@ Response get_samples(Service& service, const Request& request) {
                              .detail = "attributes can be chosen for frames only; files hold all of them",
                              .errors = {{.pointer = "?attributes", .detail = "for format=frame only"}}},
                             request);
-  const auto cloud = session.value()->edited_cloud(level);
-  if (!cloud.ok()) return problem_response(cloud.problem(), request);
-  const std::string etag =
-      etag_of({revision_name(cloud.value().revision), format.value().name, std::to_string(level)});
-  return cloud_file_response(service, request, cloud.value().cloud, format.value(), session.value()->name(),
-                             etag);
+  return file_response(service, request, *session.value(), level, format.value());
 }
 
 }  // namespace pointwright::server

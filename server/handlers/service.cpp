@@ -19,13 +19,14 @@ Service::Service(Config settings, ServiceParts parts)
       decode(std::move(parts.decode)),
       assets(std::move(parts.assets)),
       interactive(pool_threads(config), static_cast<int>(config.threads), parts.report_failure),
-      background(std::max<std::size_t>(pool_threads(config) / 2, 1), static_cast<int>(config.threads),
+      background(std::max<std::size_t>(pool_threads(config) / 2, 2), static_cast<int>(config.threads),
                  parts.report_failure),
       clouds(config.limits),
       sessions(config.limits,
                {.interactive = interactive, .background = background, .build = std::move(parts.build)}),
       upload_memory(config.limits.max_upload_memory),
       json_memory(config.limits.max_json_memory),
+      answer_memory(config.limits.max_answer_memory),
       streams(config.limits.max_streams) {}
 
 Response json_response(const protocol::JsonDocument& document, int status) {

@@ -41,6 +41,7 @@ class Service {
   SessionStore sessions;
   Budget upload_memory;  ///< of clouds that are received or decoded
   Budget json_memory;    ///< of documents
+  Budget answer_memory;  ///< of files and frames on their way out
   Budget streams;
   std::atomic<bool> stopping{false};
 };
@@ -59,16 +60,6 @@ Outcome<Session::Expected> expected_revision(const RequestHead& head);
 /// The session document with its ETag.
 Response session_response(const Session& session, const Document& document, int status = 200);
 std::string revision_tag(std::uint64_t revision);
-
-/// Runs heavy work on the pool and waits: HTTP threads do not compute.
-template <typename Work>
-auto computed(ComputePool& pool, Work work) -> Outcome<decltype(work())> {
-  try {
-    return pool.submit(std::move(work)).get();
-  } catch (const std::future_error&) {
-    return Problem{.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"};
-  }
-}
 
 /// Parses the body with one of the protocol's parsers, within the limits.
 template <typename T>

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <csignal>
 
-#include "engine/io/decoded_cloud.h"
 #include "server/ingest/child_process.h"
 #include "server/ingest/exchange_record.h"
 
@@ -131,23 +130,17 @@ Result<ImportedCloud> decode_in_child(std::span<const std::byte> bytes, CloudFor
 
 }  // namespace
 
-Result<ImportedCloud> read_confined(std::span<const std::byte> bytes, CloudFormat format,
-                                    const ImportParams& params, const ConfineLimits& limits,
-                                    const ExecutionContext* context) {
+Result<ImportedCloud> decode_confined(std::span<const std::byte> bytes, CloudFormat format,
+                                      const ImportParams& params, const ConfineLimits& limits,
+                                      const ExecutionContext* context) {
   if (bytes.empty())
     return Error{.code = ErrorCode::kEmptyCloud, .message = "there are no bytes", .field = {}};
-  Result<ImportedCloud> decoded = cancelled_error();
-  {
-    DecodeSlots::Lease lease;
-    if (limits.slots != nullptr) {
-      lease = limits.slots->acquire(std::chrono::duration<double>(limits.queue_seconds));
-      if (!lease) return decoder_error("every decoder is busy; none came free in time");
-    }
-    decoded = decode_in_child(bytes, format, params, limits, context);
+  DecodeSlots::Lease lease;
+  if (limits.slots != nullptr) {
+    lease = limits.slots->acquire(std::chrono::duration<double>(limits.queue_seconds));
+    if (!lease) return decoder_error("every decoder is busy; none came free in time");
   }
-  if (!decoded) return decoded;
-  if (context != nullptr && context->is_cancelled()) return cancelled_error();
-  return finish_cloud(std::move(decoded).value(), params);
+  return decode_in_child(bytes, format, params, limits, context);
 }
 
 }  // namespace pointwright

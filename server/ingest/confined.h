@@ -5,8 +5,7 @@
 // The daemon starts itself anew (/proc/self/exe --decode-child): no file, socket, thread or program can be
 // reached from there, memory, time and output are bounded, and the only things shared are the bytes in, the
 // decoded columns out, and a pipe that says when it is over. The columns are checked like any other foreign
-// bytes. Ordering, recentring and counting run on them here, on all cores, because the child may start no
-// threads.
+// bytes. Ordering, recentring and counting (finish_cloud()) are the caller's: the child may start no threads.
 
 #include <cstddef>
 #include <cstdint>
@@ -32,15 +31,15 @@ struct ConfineLimits {
   std::string program = "/proc/self/exe";  ///< what to start; its main() must know kDecodeChildArgument
 };
 
-/// Decodes in a confined process, then finishes here (engine/io/decoded_cloud.h).
+/// decode_cloud() (engine/io/decoded_cloud.h) in a confined process.
 /// Blocks up to queue_seconds + deadline_seconds. Safe from any thread; waits for no child but its own.
 /// A build with a sanitizer bounds the child's time and descriptors only: sanitizers need the rest.
-/// Errors: those of read_cloud(); kTooLarge where memory, time or output ran out; kMalformedData where the
+/// Errors: those of decode_cloud(); kTooLarge where memory, time or output ran out; kMalformedData where the
 ///         decoder died of the bytes; kCancelled where the context was cancelled, no slot came free in time,
 ///         or no process could be started (field "decoder": the server is to blame, not the file)
-Result<ImportedCloud> read_confined(std::span<const std::byte> bytes, CloudFormat format,
-                                    const ImportParams& params, const ConfineLimits& limits,
-                                    const ExecutionContext* context = nullptr);
+Result<ImportedCloud> decode_confined(std::span<const std::byte> bytes, CloudFormat format,
+                                      const ImportParams& params, const ConfineLimits& limits,
+                                      const ExecutionContext* context = nullptr);
 
 /// The decoder's side: main() returns this when argv[1] is kDecodeChildArgument. Never called otherwise.
 int decode_child_main();

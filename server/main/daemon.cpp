@@ -62,8 +62,9 @@ std::optional<std::string> load_samples(Service& service, Log& log) {
   for (const SampleFile& sample : service.config.samples) {
     const auto bytes = read_file(sample.path, service.config.limits.max_upload_bytes);
     if (!bytes) return bytes.error().message;
-    const auto cloud = import_cloud(service.clouds, service.decode, service.config.limits, bytes.value(),
-                                    {.name = sample.name, .media_type = "", .drop_non_finite = false});
+    const auto cloud =
+        import_cloud(service.clouds, service.decode, service.background, service.config.limits, bytes.value(),
+                     {.name = sample.name, .media_type = "", .drop_non_finite = false});
     if (!cloud.ok()) return sample.path + ": " + cloud.problem().detail;
     log.write(LogLevel::kInfo, "sample-loaded",
               {{"cloud", cloud.value()->document.id},

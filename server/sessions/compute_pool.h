@@ -14,6 +14,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "server/base/outcome.h"
+
 namespace pointwright::server {
 
 /// A fixed number of threads that take tasks in order. Thread-safe. The destructor ends the running tasks'
@@ -53,6 +55,16 @@ class ComputePool {
   bool stopping_ = false;
   std::vector<std::thread> threads_;
 };
+
+/// Runs heavy work on the pool and waits: HTTP threads do not compute. Problem: the server is stopping.
+template <typename Work>
+auto computed(ComputePool& pool, Work work) -> Outcome<decltype(work())> {
+  try {
+    return pool.submit(std::move(work)).get();
+  } catch (const std::future_error&) {
+    return protocol::Problem{.kind = protocol::ProblemKind::kOverloaded, .detail = "the server is stopping"};
+  }
+}
 
 /// Runs its tasks on the pool, one after the other, in the order in which they were posted. Thread-safe.
 /// Tasks that still wait when the strand is destroyed run nevertheless (they keep its state alive).

@@ -85,13 +85,9 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// The committed state with `level` valid; with t where the regions allow it.
   Outcome<Picture> committed_picture(std::uint32_t level, bool with_t);
-  struct EditedCloud {
-    std::shared_ptr<const Cloud> cloud;
-    std::uint64_t revision = 0;
-  };
   /// The cloud as edited: the upload's columns in coherent order, moved samples at their new places on
-  /// `level`.
-  Outcome<EditedCloud> edited_cloud(std::uint32_t level);
+  /// `level` of the picture. Cost: a copy of the cloud.
+  [[nodiscard]] std::shared_ptr<const Cloud> edited_cloud(const Picture& picture, std::uint32_t level) const;
   /// Those frame attributes that there is something to fill with.
   [[nodiscard]] std::uint16_t available_attributes(std::uint16_t asked) const;
 

@@ -182,10 +182,8 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
   });
 }
 
-Outcome<Session::EditedCloud> Session::edited_cloud(std::uint32_t level) {
-  auto picture = committed_picture(level, false);
-  if (!picture.ok()) return picture.problem();
-  const Level& now = picture.value().surface->levels[level];
+std::shared_ptr<const Cloud> Session::edited_cloud(const Picture& picture, std::uint32_t level) const {
+  const Level& now = picture.surface->levels[level];
   auto cloud = std::make_shared<Cloud>(*params_.cloud);
   parallel_for(cloud->size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -198,7 +196,7 @@ Outcome<Session::EditedCloud> Session::edited_cloud(std::uint32_t level) {
   });
   cloud->position = now.position;
   cloud->normal = now.normal;
-  return EditedCloud{.cloud = std::move(cloud), .revision = picture.value().revision};
+  return cloud;
 }
 
 std::uint16_t Session::available_attributes(std::uint16_t asked) const {

@@ -1,5 +1,6 @@
 #include "server/store/importer.h"
 
+#include "engine/io/decoded_cloud.h"
 #include "server/base/random_id.h"
 #include "server/ingest/confined.h"
 #include "server/store/sha256.h"
@@ -14,7 +15,7 @@ Decoder confined_decoder(const Limits& limits) {
   return [slots](std::span<const std::byte> bytes, CloudFormat format, const ImportParams& params) {
     ConfineLimits confine;
     confine.slots = slots.get();
-    return read_confined(bytes, format, params, confine);
+    return decode_confined(bytes, format, params, confine);
   };
 }
 
@@ -29,19 +30,23 @@ Result<CloudFormat> format_of(std::span<const std::byte> bytes, const std::strin
 
 }  // namespace
 
-Outcome<SharedCloud> import_cloud(CloudStore& store, const Decoder& decode, const Limits& limits,
-                                  std::span<const std::byte> bytes, const ImportRequest& request) {
+Outcome<SharedCloud> import_cloud(CloudStore& store, const Decoder& decode, ComputePool& pool,
+                                  const Limits& limits, std::span<const std::byte> bytes,
+                                  const ImportRequest& request) {
   if (bytes.empty()) return Problem{.kind = ProblemKind::kEmptyBody, .detail = "the upload has no bytes"};
   const auto format = format_of(bytes, request.media_type);
   if (!format) return protocol::to_problem(format.error());
-  auto imported =
-      decode(bytes, format.value(),
-             ImportParams{.max_samples = limits.max_samples, .drop_non_finite = request.drop_non_finite});
-  if (!imported) {
-    if (imported.error().field == "decoder")
-      return Problem{.kind = ProblemKind::kOverloaded, .detail = imported.error().message};
-    return protocol::to_problem(imported.error());
+  const ImportParams params{.max_samples = limits.max_samples, .drop_non_finite = request.drop_non_finite};
+  auto decoded = decode(bytes, format.value(), params);
+  if (!decoded) {
+    if (decoded.error().field == "decoder")
+      return Problem{.kind = ProblemKind::kOverloaded, .detail = decoded.error().message};
+    return protocol::to_problem(decoded.error());
   }
+  auto finished = computed(pool, [&] { return finish_cloud(std::move(decoded).value(), params); });
+  if (!finished.ok()) return finished.problem();
+  Result<ImportedCloud>& imported = finished.value();
+  if (!imported) return protocol::to_problem(imported.error());
   protocol::CloudDocument document{.id = random_id(),
                                    .name = request.name,
                                    .sha256 = sha256_hex(bytes),

@@ -6,11 +6,12 @@
 #include <string>
 
 #include "engine/io/cloud_io.h"
+#include "server/sessions/compute_pool.h"
 #include "server/store/cloud_store.h"
 
 namespace pointwright::server {
 
-/// Decodes foreign bytes: in a confined process in the daemon, in this one in tests.
+/// decode_cloud(): in a confined process in the daemon, in this one in tests.
 using Decoder =
     std::function<Result<ImportedCloud>(std::span<const std::byte>, CloudFormat, const ImportParams&)>;
 
@@ -23,8 +24,10 @@ struct ImportRequest {
   bool drop_non_finite = false;
 };
 
+/// Decodes, puts the cloud in order on `pool`, and stores it. Blocks until that is done.
 /// Problems: empty body, everything that decoding refuses, too many clouds, out of space, overloaded.
-Outcome<SharedCloud> import_cloud(CloudStore& store, const Decoder& decode, const Limits& limits,
-                                  std::span<const std::byte> bytes, const ImportRequest& request);
+Outcome<SharedCloud> import_cloud(CloudStore& store, const Decoder& decode, ComputePool& pool,
+                                  const Limits& limits, std::span<const std::byte> bytes,
+                                  const ImportRequest& request);
 
 }  // namespace pointwright::server

@@ -29,7 +29,10 @@ const testChecks = "-*,readability-identifier-naming,performance-for-range-copy"
 const checksFor = (path) => (path.startsWith("tests/") ? testChecks : sourceChecks);
 const cache = resolve(root, "build/checks/tidy");
 
-/** The compiler's flags per source, from the release build: everything but the compiler, -o, -c and the file. */
+/**
+ * The compiler's flags per source, from the release build: everything but the compiler, -o, -c, the file and the precompiled
+ * headers.
+ */
 export async function compileFlags() {
   const commands = resolve(root, "build/release/compile_commands.json");
   if (!existsSync(commands)) {
@@ -45,7 +48,9 @@ export async function compileFlags() {
       .slice(1)
       .map((word) => word.replace(/\\(.)/g, "$1"));
     const kept = words.filter(
-      (word, i) => word !== "-c" && word !== "-o" && words[i - 1] !== "-o" && words[i - 1] !== "-c",
+      (word, i) =>
+        !["-c", "-o", "-include", "-Winvalid-pch"].includes(word) &&
+        !["-c", "-o", "-include"].includes(words[i - 1]),
     );
     flags.set(file.startsWith(`${root}/`) ? file.slice(root.length + 1) : file, kept);
   }

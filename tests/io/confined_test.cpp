@@ -8,6 +8,7 @@
 #include <string>
 #include <thread>
 
+#include "engine/io/decoded_cloud.h"
 #include "server/ingest/sandbox.h"
 #include "tests/io/io_support.h"
 
@@ -21,8 +22,10 @@ ConfineLimits limits() {
 }
 
 Result<ImportedCloud> read(std::span<const std::byte> bytes, CloudFormat format,
-                           const ImportParams& params = {}) {
-  return read_confined(bytes, format, params, limits());
+                           const ImportParams& params = {}, const ConfineLimits& within = limits()) {
+  auto decoded = decode_confined(bytes, format, params, within);
+  if (!decoded.ok()) return decoded;
+  return finish_cloud(std::move(decoded).value(), params);
 }
 
 std::size_t open_descriptors() {
@@ -114,13 +117,13 @@ TEST_CASE("memory, time and queue have their limits") {
   if (!kSanitizedBuild) {
     ConfineLimits narrow = limits();
     narrow.memory_bytes = 1 << 20;
-    const auto refused = read_confined(bytes, CloudFormat::kDraco, {}, narrow);
+    const auto refused = decode_confined(bytes, CloudFormat::kDraco, {}, narrow);
     REQUIRE_FALSE(refused.ok());
     CHECK(refused.error().code == ErrorCode::kTooLarge);
   }
   ConfineLimits hasty = limits();
   hasty.deadline_seconds = 0.0;
-  const auto late = read_confined(bytes, CloudFormat::kDraco, {}, hasty);
+  const auto late = decode_confined(bytes, CloudFormat::kDraco, {}, hasty);
   REQUIRE_FALSE(late.ok());
   CHECK(late.error().code == ErrorCode::kTooLarge);
   DecodeSlots slots(1);
@@ -129,15 +132,15 @@ TEST_CASE("memory, time and queue have their limits") {
   queued.queue_seconds = 0.05;
   {
     const auto held = slots.acquire(std::chrono::seconds(1));
-    const auto waiting = read_confined(bytes, CloudFormat::kDraco, {}, queued);
+    const auto waiting = decode_confined(bytes, CloudFormat::kDraco, {}, queued);
     REQUIRE_FALSE(waiting.ok());
     CHECK(waiting.error().code == ErrorCode::kCancelled);
     CHECK(waiting.error().field == "decoder");
   }
-  CHECK(read_confined(bytes, CloudFormat::kDraco, {}, queued).ok());
+  CHECK(decode_confined(bytes, CloudFormat::kDraco, {}, queued).ok());
   const ExecutionContext context;
   context.cancel();
-  CHECK(read_confined(bytes, CloudFormat::kDraco, {}, limits(), &context).error().code ==
+  CHECK(decode_confined(bytes, CloudFormat::kDraco, {}, limits(), &context).error().code ==
         ErrorCode::kCancelled);
 }
 
@@ -145,7 +148,7 @@ TEST_CASE("a decoder that cannot be started, or is no decoder, is the server's f
   for (const char* program : {"/nonexistent/program", "/bin/true", "/bin/false"}) {
     ConfineLimits wrong = limits();
     wrong.program = program;
-    const auto failed = read_confined(bytes_of("1 2 3\n"), CloudFormat::kXyz, {}, wrong);
+    const auto failed = decode_confined(bytes_of("1 2 3\n"), CloudFormat::kXyz, {}, wrong);
     CAPTURE(program);
     REQUIRE_FALSE(failed.ok());
   }
@@ -193,7 +196,7 @@ TEST_CASE("decoders run side by side from many threads") {
     std::vector<std::jthread> threads;
     for (std::string& found : differences) {
       threads.emplace_back([&] {
-        const auto result = read_confined(bytes, CloudFormat::kDraco, {}, shared);
+        const auto result = read(bytes, CloudFormat::kDraco, {}, shared);
         if (result.ok()) found = difference(result.value().cloud, cloud);
       });
     }

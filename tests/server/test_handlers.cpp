@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "engine/io/cloud_io.h"
+#include "engine/io/decoded_cloud.h"
 #include "protocol/frames/frame.h"
 #include "protocol/frames/stream_record.h"
 #include "server/handlers/openapi.h"
@@ -43,12 +44,16 @@ struct TestService {
   explicit TestService(Config config = {})
       : service(std::move(config),
                 {.decode = [](std::span<const std::byte> bytes, CloudFormat format,
-                              const ImportParams& params) { return read_cloud(bytes, format, params); },
+                              const ImportParams& params) { return decode_cloud(bytes, format, params); },
                  .build = build_hierarchy,
                  .assets = {}}) {}
 
   Answer ask(Method method, const std::string& target, const std::string& body = "",
              std::vector<NameValue> headers = {}) {
+    return read(respond(method, target, body, std::move(headers)));
+  }
+  Response respond(Method method, const std::string& target, const std::string& body = "",
+                   std::vector<NameValue> headers = {}) {
     RequestHead head{.method = method};
     const std::size_t mark = target.find('?');
     head.path = target.substr(0, mark);
@@ -66,14 +71,10 @@ struct TestService {
     head.headers.emplace_back("content-length", std::to_string(body.size()));
     head.content_length = body.size();
     Resolution resolution = resolve(service, head, "test-request");
-    Response response;
-    if (auto* endpoint = std::get_if<Endpoint>(&resolution)) {
-      response = endpoint->handle(
+    if (auto* endpoint = std::get_if<Endpoint>(&resolution))
+      return endpoint->handle(
           Request{.head = head, .id = "test-request", .captures = endpoint->captures, .body = body});
-    } else {
-      response = std::move(std::get<Response>(resolution));
-    }
-    return read(std::move(response));
+    return std::move(std::get<Response>(resolution));
   }
   Answer get(const std::string& target, std::vector<NameValue> headers = {}) {
     return ask(Method::kGet, target, "", std::move(headers));
@@ -367,6 +368,67 @@ TEST_CASE("samples come in every format, with tags that change with the revision
   CHECK(test.get(path + "/samples?level=x").status == 422);
   CHECK(test.get(path + "/samples?format=frame&attributes=smell").status == 422);
   CHECK(test.get(path + "/samples?attributes=normal").status == 422);
+}
+
+TEST_CASE("a budget grants what is left, and to who asks alone even more") {
+  Budget budget(10);
+  auto first = budget.hold(6);
+  REQUIRE(first != nullptr);
+  CHECK(budget.hold(5) == nullptr);
+  CHECK(budget.hold_or_alone(5) == nullptr);
+  first->shrink_to(7);
+  CHECK(budget.held() == 6);
+  first->shrink_to(4);
+  CHECK(budget.held() == 4);
+  const auto copy = first;
+  first = nullptr;
+  CHECK(budget.held() == 4);
+  CHECK(budget.hold(11) == nullptr);
+  {
+    CHECK(Budget(10).hold(11) == nullptr);
+    const auto beyond = Budget(10).hold_or_alone(11);  // outlives its budget
+    CHECK(beyond != nullptr);
+  }
+  Budget small(10);
+  const auto beyond = small.hold_or_alone(25);
+  REQUIRE(beyond != nullptr);
+  CHECK(small.held() == 25);
+  CHECK(small.hold(0) == nullptr);
+  CHECK(small.hold_or_alone(1) == nullptr);
+}
+
+TEST_CASE("downloads hold memory until they are sent, and wait their turn where it is taken") {
+  Config config;
+  config.limits.max_answer_memory = 1;  // one at a time, of any size
+  TestService test(config);
+  const std::string path = test.open_painted();
+  const std::string cloud = "/v1/clouds/" + test.get("/v1/clouds").body["clouds"][0]["id"].get<std::string>();
+  const std::string preview = R"({"sequence":1,)" + kLift.substr(1);
+  const auto ask_all = [&](int status) {
+    for (const std::string& target :
+         {path + "/samples?format=ply", path + "/samples?format=frame", cloud + "/data?format=xyz"}) {
+      const Answer answer = test.get(target);
+      CHECK(answer.status == status);
+      if (status == 503) CHECK_FALSE(answer.header("Retry-After").empty());
+    }
+    CHECK(test.ask(Method::kPost, path + "/preview", preview).status == status);
+  };
+  ask_all(200);
+  CHECK(test.service.answer_memory.held() == 0);
+  for (const char* format : {"ply", "xyz", "draco", "frame"}) {
+    CAPTURE(format);
+    const Response open = test.respond(Method::kGet, path + "/samples?format=" + format);
+    REQUIRE(open.status == 200);
+    // What is held while a slow reader takes it is what there is to take.
+    CHECK(test.service.answer_memory.held() == std::get<SharedBytes>(open.body).bytes.size());
+    ask_all(503);
+    const auto etag = std::find_if(open.headers.begin(), open.headers.end(),
+                                   [](const NameValue& header) { return header.first == "ETag"; });
+    REQUIRE(etag != open.headers.end());
+    CHECK(test.get(path + "/samples?format=" + format, {{"if-none-match", etag->second}}).status == 304);
+  }
+  CHECK(test.service.answer_memory.held() == 0);
+  ask_all(200);
 }
 
 TEST_CASE("streams begin with the session and a key frame, and end with a word") {

@@ -482,9 +482,10 @@ TEST_CASE("the edited cloud keeps every attribute and the bits of what no edit m
   workshop.cloud = cloud;
   const auto session = workshop.painted();
   commit(*session, lift(0.5));
-  const auto edited = session->edited_cloud(1);
-  REQUIRE(edited.ok());
-  const Cloud& now = *edited.value().cloud;
+  const auto picture = session->committed_picture(1, false);
+  REQUIRE(picture.ok());
+  const auto edited = session->edited_cloud(picture.value(), 1);
+  const Cloud& now = *edited;
   CHECK(now.color == cloud->color);
   CHECK(now.id == cloud->id);
   CHECK(now.has_normals());
