@@ -2,55 +2,37 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "engine/core/parallel.h"
-#include "engine/spatial/kd_tree.h"
+#include "engine/spatial/block_tree.h"
+#include "engine/spatial/distinct_points.h"
 
 namespace pointwright {
-namespace {
-
-// representative[i]: the first of the adjacent samples that stand exactly where sample i stands.
-std::vector<std::uint32_t> representatives(const Points& points) {
-  std::vector<std::uint32_t> result(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const bool repeats = i > 0 && points[i] == points[i - 1];
-    result[i] = repeats ? result[i - 1] : static_cast<std::uint32_t>(i);
-  }
-  return result;
-}
-
-}  // namespace
 
 NeighborGraph build_neighbor_graph(const Points& points, std::uint32_t k, const ExecutionContext* context) {
   NeighborGraph graph;
   graph.count = points.size();
   if (points.empty()) return graph;
-  const std::vector<std::uint32_t> representative = representatives(points);
-  std::vector<std::uint32_t> distinct;
-  for (std::uint32_t i = 0; i < representative.size(); ++i) {
-    if (representative[i] == i) distinct.push_back(i);
-  }
-  graph.duplicate_count = points.size() - distinct.size();
-  graph.k = static_cast<std::uint32_t>(std::min<std::size_t>(k, distinct.size() - 1));
+  const DistinctPoints distinct(points);
+  graph.duplicate_count = points.size() - distinct.points().size();
+  graph.k = static_cast<std::uint32_t>(std::min<std::size_t>(k, distinct.points().size() - 1));
   graph.lanes.assign(padded_to_block(points.size()) * graph.k, 0U);
   if (graph.k == 0) return graph;
 
-  // Only distinct samples enter the tree: a pile of duplicates would make every query near it visit them all.
-  const KdTree tree = distinct.size() == points.size() ? KdTree(points) : KdTree(points, distinct);
+  const BlockTree tree(distinct.points());
   parallel_for(
-      points.size(),
+      distinct.points().size(),
       [&](std::size_t begin, std::size_t end) {
-        std::vector<Neighbor> found;
-        for (std::size_t i = begin; i < end; ++i) {
-          if (i > begin && representative[i] == representative[i - 1]) {
-            for (std::uint32_t j = 0; j < graph.k; ++j) graph.index(i, j) = graph.index(i - 1, j);
-            continue;
-          }
-          tree.nearest(points[i], graph.k + 1, found);
-          std::uint32_t j = 0;
-          for (const Neighbor& neighbor : found) {
-            if (neighbor.index != representative[i] && j < graph.k) graph.index(i, j++) = neighbor.index;
+        std::vector<std::int32_t> rows;
+        tree.nearest_of_range(begin, end, graph.k, std::numeric_limits<float>::infinity(), rows);
+        for (std::size_t d = begin; d < end; ++d) {
+          const std::size_t row = (d - begin) / kSimdBlock * graph.k * kSimdBlock + d % kSimdBlock;
+          for (std::size_t i = distinct.first(d); i < distinct.first(d + 1); ++i) {
+            for (std::uint32_t j = 0; j < graph.k; ++j) {
+              graph.index(i, j) = distinct.first(static_cast<std::size_t>(rows[row + j * kSimdBlock]));
+            }
           }
         }
       },

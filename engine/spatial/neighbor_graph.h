@@ -36,7 +36,7 @@ struct NeighborGraph {
 /// The k nearest neighbours of every sample (Euclidean, §2.1).
 /// Pre:         exact duplicates adjacent, as in coherent order, which is also what makes it fast. Duplicates
 ///              that stand apart count as samples of their own: they list each other, at distance 0
-/// Cost:        O(N k log N) time; 4 k bytes a sample
+/// Cost:        O(N (k + log N)) time on surfaces; 4 k bytes a sample
 /// Determinism: bitwise equal for any thread count
 /// Cancels:     between blocks of samples; the result is then incomplete and must be dropped
 NeighborGraph build_neighbor_graph(const Points& points, std::uint32_t k,
