@@ -1,5 +1,5 @@
 #pragma once
-// The umbrella operator of §3.1 with cached neighbourhoods, and local volume preservation (Eq. 9).
+// The umbrella operator of §3.1 with cached neighbourhoods, and its controls of shrinkage.
 
 #include <cstdint>
 
@@ -17,9 +17,16 @@ enum class UmbrellaWeights {
                      ///< without limit
 };
 
+/// The controls of shrinkage of §3.1.
 enum class VolumePreservation {
   kNone,
-  kLocal,  ///< each step's change is compensated by moving the k neighbours of p by (p - p')/k (Eq. 9)
+  kLocal,   ///< each step's change is compensated by moving the k neighbours of p by (p - p')/k (Eq. 9): a
+            ///< biharmonic flow, which keeps volume part by part and smooths less
+  kGlobal,  ///< the whole is scaled about its centroid to the volume that it had (Desbrun et al. 1999): thin
+            ///< parts shrink all the same and thick ones grow. Closed surfaces with oriented normals only
+            ///< (engine/smoothing/global_volume.h says what counts as closed); an open one is refused, as it
+            ///< has no volume to keep
+  kTaubin,  ///< every step is followed by one of mu < 0, 1 / lambda + 1 / mu = pass_band (Taubin 1995)
 };
 
 enum class SmoothingDirection {
@@ -32,22 +39,28 @@ struct UmbrellaParams {
   VolumePreservation preserve = VolumePreservation::kNone;
   SmoothingDirection direction = SmoothingDirection::kFree;
   float lambda = 0.5F;           ///< lambda of Eq. (7), in (0, 0.7]; beyond 0.8 compensated steps diverge
-  std::uint32_t iterations = 1;  ///< up to 100,000
+  std::uint32_t iterations = 1;  ///< up to 100,000; of kTaubin pairs of steps
+  /// k_PB of kTaubin, in (0, 0.2]: the umbrella's eigenvalue, 17 (h / L)^2 for wavelength L at spacing h and
+  /// k = 10, below which waves stay. Pairs of steps that diverge are refused.
+  float pass_band = 0.1F;
   friend bool operator==(const UmbrellaParams&, const UmbrellaParams&) = default;
 };
 
 /// Errors: kInvalidArgument with the field at fault.
 Result<void> validate(const UmbrellaParams& params);
 
+/// mu of kTaubin, negative.
+float taubin_mu(float lambda, float pass_band);
+
 /// p' = p + lambda * umbrella(p), Eq. (7) and (8), `iterations` times, over the neighbourhoods of the graph.
 /// With local preservation a step is P += u - (1/k) A^T u, u = lambda * umbrella and A the neighbour relation
 /// (Eq. 9, whatever the weights), gathered over reverse neighbours so that the result never depends on the
 /// thread count. Where samples move freely that keeps the mean of all positions; along the normals it does
 /// not, each sample taking its own normal's component only.
-/// Shapes:      N points, their graph, N unit normals (read only with kAlongNormal)
-/// Errors:      kInvalidArgument, kCancelled
-/// Cost:        O(iterations N k), parallel over samples
-/// Determinism: bitwise equal for any thread count
+/// Shapes:      N points, their graph, N unit normals (read only with kAlongNormal and kGlobal)
+/// Errors:      kInvalidArgument (field "preserve" where kGlobal finds no volume to keep), kCancelled
+/// Cost:        O(iterations N k), parallel over samples; 32 bytes a sample, and about 60 with kLocal
+/// Determinism: bitwise equal for any thread count and instruction set
 /// Cancels:     between iterations
 Result<Points> smooth(const Points& points, const Points& normals, const NeighborGraph& graph,
                       const UmbrellaParams& params, const ExecutionContext* context = nullptr);
@@ -61,9 +74,10 @@ Result<Points> smooth(const Points& points, const Points& normals, const Neighbo
 ///   heights that are linear over a neighbourhood stay and the variance, about the sample itself, is that of
 ///   umbrella weights less the part of a least-squares slope; dense samples take smaller steps, sparse ones
 ///   larger, so that every s_i is near the median.
-/// Smoothing ends before the scale where a step adds less than a hundredth of the first one's variance, as on
-/// an object that is smaller than the scale, and after `max_iterations`, as where the steps of most samples
-/// stay within clusters far smaller than the scale.
+/// No s_i is more than the box of what the sample's steps can reach allows (KernelVariance), so no more than
+/// the radius on a sphere. Smoothing ends before the scale where a step adds less than a hundredth of the
+/// first one's variance, as on an object that is smaller than the scale and where the steps of most samples
+/// stay within clusters far smaller than it, and after `max_iterations`.
 struct ScaledSmoothing {
   Points points;
   std::uint32_t iterations = 0;

@@ -190,19 +190,63 @@ TEST_CASE("at the limit of iterations smoothing ends, and says how far it came")
     REQUIRE(result.ok());
     return std::move(result).value();
   };
-  const ScaledSmoothing few = to_scale(1e4F, 20);
-  CHECK(few.iterations == 20);
-  const ScaledSmoothing more = to_scale(1e4F, 80);
-  CHECK(more.iterations == 80);
+  const ScaledSmoothing few = to_scale(1e4F, 10);
+  CHECK(few.iterations == 10);
+  const ScaledSmoothing more = to_scale(1e4F, 40);
+  CHECK(more.iterations == 40);
   CHECK(more.scale > 1.5F * few.scale);
   CHECK(more.scale < 1e4F);
   // The scale that it says is the one that would have been met in as many steps.
   const ScaledSmoothing met = to_scale(few.scale, kPlenty);
-  CHECK(met.iterations == 20);
+  CHECK(met.iterations == 10);
   CHECK(met.scale == doctest::Approx(static_cast<double>(few.scale)).epsilon(1e-3));
   const ScaledSmoothing none = to_scale(1.0F, 0);
   CHECK(none.points == surface.position);
   CHECK(none.scale == 0.0F);
+}
+
+TEST_CASE("along the normals no scale beyond the object's size is reported") {
+  // Steps along the normals add variance for ever; no weights about a point of a sphere that stay on it have
+  // more than radius^2 an axis. At most a few bounded samples more than half end it.
+  for (const std::size_t count : {300U, 1'000U}) {
+    for (const Sampling sampling : {Sampling::kRegular, Sampling::kRandom}) {
+      const Surface surface = sphere(count, 2.0, sampling);
+      const auto result =
+          smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10), 1e4F,
+                          SmoothingDirection::kAlongNormal, kPlenty);
+      REQUIRE(result.ok());
+      MESSAGE(count << " samples: scale " << result.value().scale << " after " << result.value().iterations);
+      CHECK(result.value().scale <= 2.0F);
+      CHECK(result.value().scale > 1.9F);
+      CHECK(result.value().iterations < kPlenty);
+    }
+  }
+}
+
+TEST_CASE("clusters that do not join are smoothed as far as they reach, and say so") {
+  // Twelve samples each within 0.01, all ten neighbours among them: no step leaves a cluster.
+  test::Random random(5);
+  Surface surface;
+  constexpr std::size_t kClusters = 400;
+  surface.position.resize(12 * kClusters);
+  surface.normal.resize(12 * kClusters);
+  for (std::size_t i = 0; i < surface.size(); ++i) {
+    const std::size_t cluster = i / 12;
+    const Vec3d corner(static_cast<double>(cluster % 20), static_cast<double>(cluster / 20), 0.0);
+    surface.position.set(
+        i, (corner + 0.005 * Vec3d(random.uniform(-1, 1), random.uniform(-1, 1), 0)).cast<float>());
+    surface.normal.set(i, {0, 0, 1});
+  }
+  surface = coherent(surface);
+  const NeighborGraph graph = build_neighbor_graph(surface.position, 10);
+  for (const SmoothingDirection direction : {SmoothingDirection::kFree, SmoothingDirection::kAlongNormal}) {
+    const auto result = smooth_to_scale(surface.position, surface.normal, graph, 1.0F, direction, kPlenty);
+    REQUIRE(result.ok());
+    MESSAGE("scale " << result.value().scale << " after " << result.value().iterations);
+    CHECK(result.value().scale > 0.001F);
+    CHECK(result.value().scale <= 0.005F);
+    CHECK(result.value().iterations < kPlenty);
+  }
 }
 
 TEST_CASE("a cancel from elsewhere ends the smoothing") {

@@ -1,0 +1,235 @@
+// The second moments of a composition of local averages; bounds after Bhatia and Davis, "A better bound on
+// the variance", 2000; strongly connected components after Tarjan, 1972.
+#include "engine/smoothing/kernel_variance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/core/median.h"
+#include "engine/core/parallel.h"
+
+namespace pointwright {
+namespace {
+
+// Bounds of a sample's part of lambda = 0.5: plain steps are stable up to 1.2.
+constexpr double kLeastRate = 0.25;
+constexpr double kGreatestRate = 1.6;
+// Determinant over squared trace of a flat neighbourhood's scatter, below which it is a line.
+constexpr double kCollinear = 1e-12;
+
+// Where the weight of neighbour j of sample i stands, in the graph's layout.
+std::size_t slot_of(const NeighborGraph& graph, std::size_t i, std::uint32_t j) {
+  return (i / kSimdBlock * graph.k + j) * kSimdBlock + i % kSimdBlock;
+}
+
+template <typename Body>
+void for_each_sample(std::size_t count, Body body) {
+  parallel_for(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(i);
+  });
+}
+
+// What a step along the normals does to heights over the tangent planes. The normal is that of the plane
+// fitted to a sample and its neighbours, so n . u leaves out of the umbrella vector u what a plane's slope
+// would give: sum (f_j - f_i) / k - u . grad f, grad f the least-squares gradient. That is an umbrella with
+// weights 1 / k - c_j, c_j = (y_j - m)' C^-1 u, m and C the mean and the scatter of the k + 1 points y: plane
+// heights stay, so the weights' mean stays on the sample. Each c_j is at most (k + 1) / k, the leverages
+// being at most 1.
+std::vector<float> level_weights(const Points& points, const Points& normals, const NeighborGraph& graph) {
+  std::vector<float> weights(graph.lanes.size(), 0.0F);
+  parallel_for(graph.count, [&](std::size_t begin, std::size_t end) {
+    std::vector<Eigen::Vector2d> y(graph.k);
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3d along = normals[i].cast<double>().unitOrthogonal();
+      const Vec3d across = normals[i].cast<double>().cross(along);
+      Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+      Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        const Vec3d e = (points[graph.index(i, j)] - points[i]).cast<double>();
+        y[j] = {e.dot(along), e.dot(across)};
+        sum += y[j];
+        scatter += y[j] * y[j].transpose();
+      }
+      const Eigen::Vector2d mean = sum / static_cast<double>(graph.k + 1);
+      scatter -= static_cast<double>(graph.k + 1) * mean * mean.transpose();
+      const double size = scatter.trace();
+      const bool spans_plane = scatter.determinant() > kCollinear * size * size;
+      const Eigen::Vector2d slope =
+          spans_plane ? Eigen::Vector2d(scatter.inverse() * sum / static_cast<double>(graph.k))
+                      : Eigen::Vector2d(Eigen::Vector2d::Zero());
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        weights[slot_of(graph, i, j)] =
+            static_cast<float>(1.0 / static_cast<double>(graph.k) - slope.dot(y[j] - mean));
+      }
+    }
+  });
+  return weights;
+}
+
+// Mean squared distance to the neighbours, plain (no weights) or weighted: lambda times this is the variance
+// that a step adds to a sample's weights.
+std::vector<double> mean_squares(const Points& points, const NeighborGraph& graph,
+                                 const std::vector<float>& weights = {}) {
+  std::vector<double> result(points.size());
+  parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      double sum = 0.0;
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        const auto square = static_cast<double>((points[graph.index(i, j)] - points[i]).squaredNorm());
+        sum += weights.empty() ? square / static_cast<double>(graph.k)
+                               : static_cast<double>(weights[slot_of(graph, i, j)]) * square;
+      }
+      result[i] = sum;
+    }
+  });
+  return result;
+}
+
+// Of each sample's lambda: what makes steps mean the same where samples are dense and where they are sparse.
+std::vector<double> step_rates(const std::vector<double>& gain, const NeighborGraph& graph) {
+  std::vector<double> smooth_gain(gain.size());  // a single sample's own gain scatters too much
+  for (std::size_t i = 0; i < gain.size(); ++i) {
+    double sum = gain[i];
+    for (std::uint32_t j = 0; j < graph.k; ++j) sum += gain[graph.index(i, j)];
+    smooth_gain[i] = sum / static_cast<double>(graph.k + 1);
+  }
+  const double middle = median(smooth_gain);
+  std::vector<double> rate(gain.size(), 1.0);
+  for (std::size_t i = 0; i < gain.size(); ++i) {
+    if (smooth_gain[i] > 0.0) rate[i] = std::clamp(middle / smooth_gain[i], kLeastRate, kGreatestRate);
+  }
+  return rate;
+}
+
+// The boxes of what each sample's steps can reach, itself included: samples that reach each other share one,
+// and a component is complete after those that it leads to (Tarjan's order). Iterative: paths are as long as
+// the cloud.
+std::vector<Box3f> reachable_boxes(const Points& points, const NeighborGraph& graph) {
+  constexpr std::uint32_t kNone = UINT32_MAX;
+  const std::size_t n = points.size();
+  std::vector<std::uint32_t> order(n, kNone);   // of discovery
+  std::vector<std::uint32_t> lowest(n, kNone);  // the earliest one on the stack that is reached
+  std::vector<std::uint32_t> component(n, kNone);
+  std::vector<std::uint32_t> next(n, 0);  // neighbour to look at
+  std::vector<std::uint32_t> path;
+  std::vector<std::uint32_t> stack;
+  std::vector<Box3f> box;
+  std::uint32_t discovered = 0;
+  for (std::uint32_t root = 0; root < n; ++root) {
+    if (order[root] != kNone) continue;
+    path.push_back(root);
+    while (!path.empty()) {
+      const std::uint32_t i = path.back();
+      if (order[i] == kNone) {
+        order[i] = lowest[i] = discovered++;
+        stack.push_back(i);
+      }
+      if (next[i] < graph.k) {
+        const std::uint32_t j = graph.index(i, next[i]++);
+        if (order[j] == kNone) {
+          path.push_back(j);
+        } else if (component[j] == kNone) {
+          lowest[i] = std::min(lowest[i], order[j]);
+        }
+        continue;
+      }
+      path.pop_back();
+      if (!path.empty()) lowest[path.back()] = std::min(lowest[path.back()], lowest[i]);
+      if (lowest[i] != order[i]) continue;
+      const auto first = std::find(stack.rbegin(), stack.rend(), i).base() - 1;
+      Box3f reach;
+      for (auto member = first; member != stack.end(); ++member) {
+        component[*member] = static_cast<std::uint32_t>(box.size());
+      }
+      for (auto member = first; member != stack.end(); ++member) {
+        reach.extend(points[*member]);
+        for (std::uint32_t j = 0; j < graph.k; ++j) {
+          const std::uint32_t other = component[graph.index(*member, j)];
+          if (other == box.size()) continue;
+          reach.extend(box[other].min);
+          reach.extend(box[other].max);
+        }
+      }
+      stack.erase(first, stack.end());
+      box.push_back(reach);
+    }
+  }
+  std::vector<Box3f> result(n);
+  for (std::size_t i = 0; i < n; ++i) result[i] = box[component[i]];
+  return result;
+}
+
+// The most that the variance of a sample's weights can be.
+std::vector<double> greatest_variances(const Points& points, const NeighborGraph& graph) {
+  const std::vector<Box3f> reach = reachable_boxes(points, graph);
+  std::vector<double> most(points.size());
+  for_each_sample(points.size(), [&](std::size_t i) {
+    const Vec3d below = (points[i] - reach[i].min).cast<double>();
+    const Vec3d above = (reach[i].max - points[i]).cast<double>();
+    most[i] = below.dot(above);
+  });
+  return most;
+}
+
+}  // namespace
+
+KernelVariance::KernelVariance(const Points& points, const Points& normals, const NeighborGraph& graph,
+                               SmoothingDirection direction)
+    : graph_(&graph), is_free_(direction == SmoothingDirection::kFree), columns_(is_free_ ? 4 : 1) {
+  for (auto& c : columns_) c.resize(points.size());
+  if (!is_free_) {
+    weights_ = level_weights(points, normals, graph);
+    first_gain_ = mean_squares(points, graph);
+    gain_ = mean_squares(points, graph, weights_);
+    rate_ = step_rates(first_gain_, graph);
+    most_ = greatest_variances(points, graph);
+    return;
+  }
+  const Box3f box = bounds_of(points);
+  const Vec3f center = 0.5F * (box.min + box.max);
+  for_each_sample(points.size(), [&](std::size_t i) {
+    const Vec3d p = (points[i] - center).cast<double>();
+    for (std::size_t axis = 0; axis < 3; ++axis) columns_[axis][i] = p[static_cast<Eigen::Index>(axis)];
+    columns_[3][i] = p.squaredNorm();
+  });
+}
+
+KernelVariance::Columns KernelVariance::stepped(double lambda) const {
+  Columns result(columns_.size(), std::vector<double>(graph_->count));
+  const double uniform = 1.0 / static_cast<double>(graph_->k);
+  for (std::size_t column = 0; column < columns_.size(); ++column) {
+    const std::vector<double>& c = columns_[column];
+    for_each_sample(graph_->count, [&](std::size_t i) {
+      double sum = 0.0;
+      for (std::uint32_t j = 0; j < graph_->k; ++j) {
+        const double weight = is_free_ ? uniform : static_cast<double>(weights_[slot_of(*graph_, i, j)]);
+        sum += weight * (c[graph_->index(i, j)] - c[i]);
+      }
+      if (is_free_) {
+        result[column][i] = c[i] + lambda * sum;
+        return;
+      }
+      const double gain = is_first_ ? first_gain_[i] : gain_[i];
+      result[column][i] = std::min(c[i] + lambda * rate_[i] * (sum + gain), most_[i]);
+    });
+  }
+  return result;
+}
+
+void KernelVariance::take(Columns stepped) {
+  columns_ = std::move(stepped);
+  is_first_ = false;
+}
+
+double KernelVariance::median(const Columns& columns) const {
+  std::vector<double> variance = columns.back();
+  if (is_free_) {
+    for_each_sample(graph_->count, [&](std::size_t i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) variance[i] -= columns[axis][i] * columns[axis][i];
+    });
+  }
+  return 0.5 * std::max(0.0, pointwright::median(std::move(variance)));
+}
+
+}  // namespace pointwright
