@@ -56,6 +56,7 @@ Grid sort_into_cells(const Points& position, const Vec3d& origin, double cell) {
 struct CellSplit {
   std::array<Vec3d, 2> position;
   std::array<Vec3d, 2> normal;
+  std::array<double, 2> count{};
   int parts = 1;
   Vec3d axis = Vec3d::Zero();  // a sample belongs to part 0 where normal . axis >= 0
 };
@@ -100,12 +101,87 @@ CellSplit split_cell(const Points& position, const Points& normal, const std::ui
     split.position[part] /= count[part];
     const double length = split.normal[part].norm();
     split.normal[part] = length > 1e-6 ? Vec3d(split.normal[part] / length) : normal[*begin].cast<double>();
+    split.count[part] = count[part];
   }
   return split;
 }
 
+// The centroids of the cells, not yet in coherent order.
+struct Centroids {
+  Points position;
+  Points normal;
+  std::vector<double> count;  // samples that each stands for
+};
+
+// The nearest centroid of each one's side that is closer than `limit`; itself where there is none.
+std::vector<std::uint32_t> nearest_of_side(const Centroids& centroids,
+                                           const std::vector<std::uint32_t>& alive, double limit) {
+  constexpr float kSameSide = 0.5F;
+  constexpr std::size_t kLookedAt = 5;  // itself and those nearest to it
+  const KdTree tree(centroids.position, alive);
+  std::vector<std::uint32_t> nearest(alive.size());
+  const auto limit_sq = static_cast<float>(limit * limit);
+  parallel_for(alive.size(), [&](std::size_t begin, std::size_t end) {
+    std::vector<Neighbor> found;
+    for (std::size_t a = begin; a < end; ++a) {
+      const std::uint32_t i = alive[a];
+      nearest[a] = i;
+      tree.nearest(centroids.position[i], kLookedAt, found);
+      for (const Neighbor& neighbor : found) {
+        if (neighbor.index == i || !(neighbor.distance_sq < limit_sq)) continue;
+        if (centroids.normal[i].dot(centroids.normal[neighbor.index]) < kSameSide) continue;
+        nearest[a] = neighbor.index;
+        break;
+      }
+    }
+  });
+  return nearest;
+}
+
+// Cells cut a surface that runs along their border into slivers whose centroids stand close together and
+// would count as much as whole cells: averages over Q would lean towards the border. Mutually nearest ones of
+// one side, less than 0.7 cells apart, become one, in a few rounds. Returns for each centroid the one that it
+// has become part of, or itself.
+std::vector<std::uint32_t> join_slivers(Centroids& centroids, double cell) {
+  constexpr double kJoinOfCell = 0.7;
+  constexpr int kRounds = 4;
+  std::vector<std::uint32_t> part_of(centroids.position.size());
+  std::iota(part_of.begin(), part_of.end(), 0U);
+  std::vector<std::uint32_t> alive = part_of;
+  std::vector<std::uint32_t> place(part_of.size());
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<std::uint32_t> nearest = nearest_of_side(centroids, alive, kJoinOfCell * cell);
+    for (std::uint32_t a = 0; a < alive.size(); ++a) place[alive[a]] = a;
+    std::vector<std::uint32_t> left;
+    for (std::uint32_t a = 0; a < alive.size(); ++a) {
+      const std::uint32_t i = alive[a];
+      const std::uint32_t j = nearest[a];
+      const bool mutual = j != i && nearest[place[j]] == i;
+      if (!mutual || i < j) left.push_back(i);
+      if (!mutual || j < i) continue;
+      const double together = centroids.count[i] + centroids.count[j];
+      const auto mean = [&](const Points& points) -> Vec3d {
+        return (centroids.count[i] * points[i].cast<double>() +
+                centroids.count[j] * points[j].cast<double>()) /
+               together;
+      };
+      centroids.position.set(i, mean(centroids.position).cast<float>());
+      centroids.normal.set(i, mean(centroids.normal).normalized().cast<float>());
+      centroids.count[i] = together;
+      part_of[j] = i;
+    }
+    if (left.size() == alive.size()) break;
+    alive = std::move(left);
+  }
+  for (std::uint32_t& whole : part_of) {
+    while (part_of[whole] != whole) whole = part_of[whole];
+  }
+  return part_of;
+}
+
 // Fills position, normal and counterpart of Q from the cells.
-void gather_cells(const Points& position, const Points& normal, const Grid& grid, BaseSurface& base) {
+void gather_cells(const Points& position, const Points& normal, const Grid& grid, double cell,
+                  BaseSurface& base) {
   const std::size_t cells = grid.first.size() - 1;
   std::vector<CellSplit> splits(cells);
   parallel_for(
@@ -119,16 +195,18 @@ void gather_cells(const Points& position, const Points& normal, const Grid& grid
       256);
   std::vector<std::uint32_t> slot(cells + 1, 0);
   for (std::size_t c = 0; c < cells; ++c) slot[c + 1] = slot[c] + static_cast<std::uint32_t>(splits[c].parts);
-  Points unordered(slot[cells]);
-  Points unordered_normal(slot[cells]);
+  Centroids centroids{.position = Points(slot[cells]),
+                      .normal = Points(slot[cells]),
+                      .count = std::vector<double>(slot[cells])};
   base.counterpart.resize(position.size());
   parallel_for(
       cells,
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t c = begin; c < end; ++c) {
           for (std::uint32_t part = 0; part < static_cast<std::uint32_t>(splits[c].parts); ++part) {
-            unordered.set(slot[c] + part, splits[c].position[part].cast<float>());
-            unordered_normal.set(slot[c] + part, splits[c].normal[part].cast<float>());
+            centroids.position.set(slot[c] + part, splits[c].position[part].cast<float>());
+            centroids.normal.set(slot[c] + part, splits[c].normal[part].cast<float>());
+            centroids.count[slot[c] + part] = splits[c].count[part];
           }
           for (std::uint32_t at = grid.first[c]; at < grid.first[c + 1]; ++at) {
             const std::uint32_t i = grid.order[at];
@@ -138,17 +216,23 @@ void gather_cells(const Points& position, const Points& normal, const Grid& grid
         }
       },
       256);
+  const std::vector<std::uint32_t> part_of = join_slivers(centroids, cell);
   // Coherent order inside Q, as everywhere.
-  const std::vector<std::uint32_t> order = coherent_order(unordered);
+  const std::vector<std::uint32_t> order = coherent_order(centroids.position);
   std::vector<std::uint32_t> rank(order.size());
+  std::uint32_t kept = 0;
   base.position.resize(order.size());
   base.normal.resize(order.size());
-  for (std::uint32_t i = 0; i < order.size(); ++i) {
-    rank[order[i]] = i;
-    base.position.set(i, unordered[order[i]]);
-    base.normal.set(i, unordered_normal[order[i]]);
+  for (const std::uint32_t c : order) {
+    if (part_of[c] != c) continue;
+    rank[c] = kept;
+    base.position.set(kept, centroids.position[c]);
+    base.normal.set(kept, centroids.normal[c]);
+    ++kept;
   }
-  for (std::uint32_t& q : base.counterpart) q = rank[q];
+  base.position.resize(kept);
+  base.normal.resize(kept);
+  for (std::uint32_t& q : base.counterpart) q = rank[part_of[q]];
 }
 
 // The nearest kCachedNeighbors on the same side: neither smoothing nor projection may join opposite sheets.
@@ -239,7 +323,7 @@ Result<BaseSurface> build_base_surface(const Points& position, const Points& nor
   POINTWRIGHT_CHECK(scale > 0.0F, "a base needs a scale");
   const double cell = kCellOfScale * static_cast<double>(scale);
   BaseSurface base;
-  gather_cells(position, normal, sort_into_cells(position, origin, cell), base);
+  gather_cells(position, normal, sort_into_cells(position, origin, cell), cell, base);
   base.graph = same_side_graph(base.position, base.normal, context);
   if (context.is_cancelled()) return cancelled_error();
 

@@ -31,7 +31,8 @@ struct BaseSurface {
 };
 
 /// One sample of Q for each cell of a grid with fixed origin in model space and cell 0.7 scale (two where
-/// opposite sheets share a cell), at the centroid; then umbrella smoothing along the normals until grid,
+/// opposite sheets share a cell; slivers that the cells' borders cut off joined to their neighbours), at the
+/// centroid; then umbrella smoothing along the normals until grid,
 /// umbrella and moving least squares together amount to a Gaussian of standard deviation `scale`. The grid is
 /// what makes a base mean the same on a preview and on the full scan, keeps it even (no samples pile up under
 /// smoothing), and makes the cost independent of the scale.

@@ -1,5 +1,4 @@
-// Alexa et al., "Point set surfaces", 2001 (the projection); adaptive damping instead of the paper's fixed
-// 0.5.
+// Alexa et al., "Point set surfaces", 2001 (the projection).
 #include "engine/multires/decomposition.h"
 
 #include <algorithm>
@@ -49,8 +48,19 @@ std::vector<PackedSample> pack(const BaseSurface& base) {
 // Fits planes to Q around a point. One for each thread: it owns the candidate list.
 class PlaneFitter {
  public:
-  PlaneFitter(const BaseSurface& base, const std::vector<PackedSample>& samples, const KdTree& tree)
-      : base_(base), samples_(samples), tree_(tree) {}
+  PlaneFitter(const BaseSurface& base, const std::vector<PackedSample>& samples, const KdTree& tree,
+              const DecomposeParams& params)
+      : base_(base),
+        samples_(samples),
+        tree_(tree),
+        gaussian_(params.weights == PlaneWeights::kGaussian),
+        sigma_sq_(static_cast<double>(params.sigma) * static_cast<double>(params.sigma)) {}
+
+  // The sample of Q nearest to p.
+  std::uint32_t nearest(const Vec3f& p) {
+    tree_.nearest(p, 1, found_);
+    return found_[0].index;
+  }
 
   // The weighted plane of Q's samples around r: hops from `q` to the nearest of its cached neighbours until
   // none is nearer (q is updated), then fits to that sample and its neighbours.
@@ -104,19 +114,26 @@ class PlaneFitter {
     return static_cast<double>(sorted[kPlaneNeighbors]);
   }
 
+  // Of a sample whose squared distance is `x` times that of the support. None lies beyond it.
+  [[nodiscard]] double weight_at(double x) const {
+    const double inside = 1.0 - x;
+    if (inside < 0.0) return 0.0;
+    return gaussian_ ? std::exp(-x / sigma_sq_) : inside * inside * inside * inside;
+  }
+
   Plane fit(const Vec3f& r, const Plane& last) {
     if (count_ == 0) return last;
     const double radius_sq = support_sq();
     PlaneFit plane;
     Vec3d side = Vec3d::Zero();
     for (std::size_t c = 0; c < count_; ++c) {
-      const double inside = radius_sq > 0.0 ? 1.0 - static_cast<double>(distance_sq_[c]) / radius_sq : 1.0;
-      if (inside <= 0.0) continue;
+      const double near = weight_at(radius_sq > 0.0 ? static_cast<double>(distance_sq_[c]) / radius_sq : 0.0);
+      if (near <= 0.0) continue;
       const PackedSample& s = samples_[index_[c]];
       const Vec3d n(static_cast<double>(s.nx), static_cast<double>(s.ny), static_cast<double>(s.nz));
       // Samples of an opposite sheet fade out; same-sheet ones count whole.
       const double facing = std::clamp(2.0 * n.dot(last.normal), 0.0, 1.0);
-      const double weight = inside * inside * inside * inside * facing;
+      const double weight = near * facing;
       plane.add(static_cast<double>(s.x - r.x()), static_cast<double>(s.y - r.y()),
                 static_cast<double>(s.z - r.z()), weight);
       side += weight * n;
@@ -131,6 +148,8 @@ class PlaneFitter {
   const BaseSurface& base_;
   const std::vector<PackedSample>& samples_;
   const KdTree& tree_;
+  const bool gaussian_;
+  const double sigma_sq_;
   std::vector<Neighbor> found_;
   std::array<std::uint32_t, kCachedNeighbors + 1> index_{};
   std::array<float, kCachedNeighbors + 1> distance_sq_{};
@@ -170,6 +189,13 @@ void iterate(const Vec3d& p, double tolerance, std::uint32_t limit, bool adaptiv
 Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base,
                                 float spacing, const DecomposeParams& params,
                                 const ExecutionContext& context) {
+  if (!(params.sigma > 0.0F && params.sigma <= 100.0F)) {
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "sigma must lie in (0, 100]",
+                 .field = "sigma",
+                 .limit = 100.0,
+                 .actual = static_cast<double>(params.sigma)};
+  }
   const std::size_t n = position.size();
   Decomposition result;
   result.base.resize(n);
@@ -183,24 +209,27 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
   struct Counts {
     std::size_t at_limit = 0, fallback = 0, flipped = 0, iterations = 0;
   };
+  const bool start_nearest = params.start == IterationStart::kNearest;
+  const bool adaptive = params.damping == Damping::kAdaptive;
   std::vector<Counts> counts((n + kParallelBlock - 1) / kParallelBlock);
   parallel_for(
       n,
       [&](std::size_t begin, std::size_t end) {
-        PlaneFitter fitter(base, samples, tree);
+        PlaneFitter fitter(base, samples, tree, params);
         Counts& count = counts[begin / kParallelBlock];
         for (std::size_t i = begin; i < end; ++i) {
           const Vec3d p = position[i].cast<double>();
           const std::uint32_t own = base.counterpart[i];
           const Plane own_plane{base.position[own].cast<double>(), base.normal[own].cast<double>()};
-          std::uint32_t q = own;
-          BasePoint found{.r = project(p, own_plane), .plane = own_plane};
+          std::uint32_t q = start_nearest ? fitter.nearest(position[i]) : own;
+          const Plane start{base.position[q].cast<double>(), base.normal[q].cast<double>()};
+          BasePoint found{.r = project(p, start), .plane = start};
           iterate(
-              p, tolerance, params.walk_limit, true,
+              p, tolerance, params.walk_limit, adaptive,
               [&](const Vec3f& r, const Plane& last) { return fitter.by_walk(r, q, last); }, found);
           if (!found.converged) {
-            found.r = project(p, own_plane);
-            found.plane = own_plane;
+            found.r = project(p, start);
+            found.plane = start;
             iterate(
                 p, tolerance, params.tree_limit, false,
                 [&](const Vec3f& r, const Plane& last) { return fitter.by_tree(r, last); }, found);

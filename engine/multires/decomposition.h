@@ -22,11 +22,35 @@ struct Decomposition {
   double mean_iterations = 0.0;
 };
 
+/// Where the iteration of a sample starts.
+enum class IterationStart {
+  kCounterpart,  ///< the sample of Q that stands for it
+  kNearest,      ///< the nearest sample of Q, as §3.4 has it: on thin parts it may be another sheet's
+};
+
+/// How much of a Newton step is taken.
+enum class Damping {
+  kAdaptive,  ///< all of it, less where steps stop shrinking, at least a quarter
+  kFixed,     ///< a half, as §3.4 has it
+};
+
+/// What weighs the samples of Q in a plane's fit; d is a sample's distance, r that of the first sample beyond
+/// the nearest kPlaneNeighbors.
+enum class PlaneWeights {
+  kCompact,   ///< (1 - d^2/r^2)^4: vanishes where the neighbour set changes
+  kGaussian,  ///< exp(-d^2 / (sigma r)^2) of Eq. 3: steps over such changes, so some iterations never end
+};
+
+/// The defaults are what converges best; the paper's own ways are there to be compared with.
 struct DecomposeParams {
+  IterationStart start = IterationStart::kCounterpart;
+  Damping damping = Damping::kAdaptive;
+  PlaneWeights weights = PlaneWeights::kCompact;
+  float sigma = 0.5F;  ///< of kGaussian, in (0, 100]
   /// Converged where a step moves less than this times the median sample spacing.
   float tolerance_spacing = 1e-3F;
   std::uint32_t walk_limit = 30;  ///< Newton steps over the cached graph before the tree takes over
-  std::uint32_t tree_limit = 50;  ///< Newton steps with exact neighbours and damping 0.5
+  std::uint32_t tree_limit = 50;  ///< Newton steps with exact neighbours and half steps
   friend bool operator==(const DecomposeParams&, const DecomposeParams&) = default;
 };
 
@@ -38,7 +62,7 @@ struct DecomposeParams {
 /// spacings, a flipped normal, |d| beyond four scales) the plane through the counterpart with its normal
 /// stands in, and is counted.
 /// Shapes:      N samples with unit normals; spacing > 0 is their median spacing
-/// Errors:      kCancelled
+/// Errors:      kInvalidArgument (sigma), kCancelled
 /// Cost:        O(N iterations k); about 2.5 iterations a sample
 /// Determinism: bitwise equal for any thread count
 /// Cancels:     between blocks of samples

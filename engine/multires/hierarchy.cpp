@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "engine/core/median.h"
@@ -13,6 +14,9 @@
 
 namespace pointwright {
 namespace {
+
+// Closer scales would ask for a base of a grid much finer than the level that it smooths.
+constexpr float kGreatestScaleRatio = 0.95F;
 
 // Uploaded normals, made unit; estimated ones where an uploaded one is no direction.
 Points adopt_normals(const Points& uploaded, const Points& estimated) {
@@ -63,19 +67,27 @@ Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origi
 }  // namespace
 
 Result<void> validate(const HierarchyParams& params) {
-  if (params.scales.size() != 1) {
+  if (params.scales.empty() || params.scales.size() > kMaxBands) {
     return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "exactly one band is supported",
+                 .message = "a hierarchy has 1 to " + std::to_string(kMaxBands) + " bands",
                  .field = "scales",
-                 .limit = 1,
+                 .limit = static_cast<double>(kMaxBands),
                  .actual = static_cast<double>(params.scales.size())};
   }
-  for (const float scale : params.scales) {
+  for (std::size_t level = 0; level < params.scales.size(); ++level) {
+    const float scale = params.scales[level];
     if (!(scale >= 1e-4F && scale <= 0.2F)) {
       return Error{.code = ErrorCode::kInvalidArgument,
                    .message = "a scale is a fraction of the bounding-box diagonal between 0.0001 and 0.2",
                    .field = "scales",
                    .limit = 0.2,
+                   .actual = static_cast<double>(scale)};
+    }
+    if (level > 0 && !(scale <= kGreatestScaleRatio * params.scales[level - 1])) {
+      return Error{.code = ErrorCode::kInvalidArgument,
+                   .message = "scales descend: each is at most 0.95 of the one before",
+                   .field = "scales",
+                   .limit = static_cast<double>(kGreatestScaleRatio * params.scales[level - 1]),
                    .actual = static_cast<double>(scale)};
     }
   }
@@ -120,14 +132,23 @@ Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& par
 
   const float diagonal = bounds_of(cloud.position).diagonal();
   const float spacing = median(result.spacing);
+  double variance = 0.0;  // of all the smoothing down to level band + 1
   for (std::size_t band = bands; band-- > 0;) {
     context.begin_phase("decomposition",
                         0.55 + 0.45 * static_cast<double>(bands - 1 - band) / static_cast<double>(bands));
-    auto detail =
-        decompose_band(result.surface.levels[band + 1], cloud.origin, params.scales[band] * diagonal, spacing,
-                       context, result.surface.levels[band], result.reports[band]);
+    // From the scales asked for, not from what the finer bands have reached: that depends on the sampling,
+    // and the base's grid must be the same for every sampling of one object.
+    const double asked = static_cast<double>(params.scales[band]) * static_cast<double>(diagonal);
+    const double finer =
+        band + 1 < bands ? static_cast<double>(params.scales[band + 1]) * static_cast<double>(diagonal) : 0.0;
+    const double scale = std::sqrt(asked * asked - finer * finer);
+    DecompositionReport& report = result.reports[band];
+    auto detail = decompose_band(result.surface.levels[band + 1], cloud.origin, static_cast<float>(scale),
+                                 spacing, context, result.surface.levels[band], report);
     if (!detail) return detail.error();
     result.surface.detail[band] = std::move(detail).value();
+    variance += static_cast<double>(report.scale) * static_cast<double>(report.scale);
+    report.scale = static_cast<float>(std::sqrt(variance));
   }
   context.begin_phase("ready", 1.0);
   return result;

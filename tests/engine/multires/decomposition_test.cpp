@@ -195,6 +195,55 @@ TEST_CASE("samples with an opposed normal are counted as flipped and keep the id
   }
 }
 
+TEST_CASE("the paper's start, damping and weights are there, and why they are not the default") {
+  // Random samples make a base whose neighbour sets change unevenly.
+  const Surface surface = displaced(torus(30'000, 1.0, 0.4, Sampling::kRandom), [](const Vec3d& p) {
+    return 0.01 * std::sin(31.0 * p.x()) * std::sin(31.0 * p.y()) * std::cos(31.0 * p.z());
+  });
+  const Run best = run(surface, 0.1);
+  const Run fixed = run(surface, 0.1, {.damping = Damping::kFixed});
+  // A half of every step: from the first step on the residual is at least halved each time, a thousandth of
+  // a spacing is about ten of them away.
+  CHECK(best.parts.mean_iterations < 4.0);
+  CHECK(fixed.parts.mean_iterations > 2.0 * best.parts.mean_iterations);
+  // The same base points, wherever both converge.
+  std::size_t apart = 0;
+  for (std::size_t i = 0; i < surface.size(); ++i) {
+    if ((best.parts.base[i] - fixed.parts.base[i]).norm() > static_cast<float>(0.02 * best.spacing)) ++apart;
+  }
+  CHECK(apart < surface.size() / 1000);
+  // A Gaussian that is wide at the border of the neighbourhood steps over its changes: limit cycles.
+  const Run wide = run(surface, 0.1, {.weights = PlaneWeights::kGaussian, .sigma = 1.0F});
+  const Run narrow = run(surface, 0.1, {.weights = PlaneWeights::kGaussian, .sigma = 0.35F});
+  CHECK(wide.parts.at_limit > 10 * (best.parts.at_limit + 1));
+  CHECK(narrow.parts.at_limit < wide.parts.at_limit / 5);
+}
+
+TEST_CASE("on a thin sheet the nearest sample of the base may be another sheet's") {
+  // Bumps that reach beyond the gap's middle: their samples stand nearer to the other sheet's base.
+  const double gap = 0.05;
+  const Surface sheets = displaced(parallel_sheets(120, 0.01, gap, Sampling::kJittered), [&](const Vec3d& p) {
+    const bool dented = std::abs(p.x()) < 0.03 && std::abs(p.y()) < 0.03;
+    return dented && p.z() > 0.0 ? -0.7 * gap : 0.0;
+  });
+  const Run own = run(sheets, 0.06);
+  const Run nearest = run(sheets, 0.06, {.start = IterationStart::kNearest});
+  CHECK(own.parts.flipped == 0);
+  CHECK(nearest.parts.flipped > 20);  // of the 36 or so samples of the dent
+}
+
+TEST_CASE("a sigma out of range is refused") {
+  const Surface surface = sphere(500, 1.0, Sampling::kRandom);
+  const auto base = build_base_surface(surface.position, surface.normal, Vec3d::Zero(), 0.3F, {});
+  REQUIRE(base.ok());
+  for (const float sigma : {0.0F, -1.0F, 101.0F, std::nanf("")}) {
+    const auto refused =
+        decompose(surface.position, surface.normal, base.value(), 0.1F, {.sigma = sigma}, {});
+    REQUIRE_FALSE(refused.ok());
+    CHECK(refused.error().field == "sigma");
+  }
+}
+
 TEST_CASE("a cancelled decomposition says so") {
   const Surface surface = sphere(2'000, 1.0, Sampling::kRegular);
   const auto base = build_base_surface(surface.position, surface.normal, Vec3d::Zero(), 0.2F, {});

@@ -25,38 +25,42 @@ Hierarchy built(const Cloud& cloud, const HierarchyParams& params = {}) {
   return std::move(result).value();
 }
 
-// The largest |p - (r + d n)| over the diagonal, or over the largest coordinate where that is more: floats
-// have no finer steps there. Infinite where anything is not finite or a normal is not unit.
+// The largest |p_{k+1} - (p_k + d_k n_k)| of all bands over the diagonal, or over the largest coordinate where
+// that is more: floats have no finer steps there. Infinite where anything is not finite or a normal is not
+// unit.
 double identity_error(const Cloud& cloud, const Hierarchy& hierarchy) {
-  const Level& base = hierarchy.surface.levels.front();
-  const std::vector<float>& detail = hierarchy.surface.detail.front();
+  const MultiresSurface& surface = hierarchy.surface;
   const Box3f box = bounds_of(cloud.position);
   const double size = static_cast<double>(
       std::max({box.diagonal(), box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff()}));
   double worst = 0.0;
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const Vec3d again =
-        base.position[i].cast<double>() + static_cast<double>(detail[i]) * base.normal[i].cast<double>();
-    const double error = (again - cloud.position[i].cast<double>()).norm();
-    const bool units = std::abs(base.normal[i].norm() - 1.0F) < 1e-5F &&
-                       std::abs(hierarchy.surface.finest().normal[i].norm() - 1.0F) < 1e-5F;
-    if (!std::isfinite(error) || !units) return std::numeric_limits<double>::infinity();
-    worst = std::max(worst, error);
+  for (std::size_t band = 0; band < surface.band_count(); ++band) {
+    const Level& base = surface.levels[band];
+    const Level& above = surface.levels[band + 1];
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      const Vec3d again = base.position[i].cast<double>() +
+                          static_cast<double>(surface.detail[band][i]) * base.normal[i].cast<double>();
+      const double error = (again - above.position[i].cast<double>()).norm();
+      const bool units =
+          std::abs(base.normal[i].norm() - 1.0F) < 1e-5F && std::abs(above.normal[i].norm() - 1.0F) < 1e-5F;
+      if (!std::isfinite(error) || !units) return std::numeric_limits<double>::infinity();
+      worst = std::max(worst, error);
+    }
   }
   return size > 0.0 ? worst / size : worst;
 }
 
-void check_shapes(const Cloud& cloud, const Hierarchy& hierarchy) {
-  REQUIRE(hierarchy.surface.levels.size() == 2);
-  REQUIRE(hierarchy.surface.detail.size() == 1);
-  REQUIRE(hierarchy.reports.size() == 1);
-  CHECK(hierarchy.surface.band_count() == 1);
+void check_shapes(const Cloud& cloud, const Hierarchy& hierarchy, std::size_t bands = 1) {
+  REQUIRE(hierarchy.surface.levels.size() == bands + 1);
+  REQUIRE(hierarchy.surface.detail.size() == bands);
+  REQUIRE(hierarchy.reports.size() == bands);
+  CHECK(hierarchy.surface.band_count() == bands);
   CHECK(hierarchy.surface.sample_count() == cloud.size());
   for (const Level& level : hierarchy.surface.levels) {
     CHECK(level.position.size() == cloud.size());
     CHECK(level.normal.size() == cloud.size());
   }
-  CHECK(hierarchy.surface.detail[0].size() == cloud.size());
+  for (const std::vector<float>& detail : hierarchy.surface.detail) CHECK(detail.size() == cloud.size());
   CHECK(hierarchy.spacing.size() == cloud.size());
   CHECK(hierarchy.graph.count == cloud.size());
   CHECK(hierarchy.surface.finest().position == cloud.position);
@@ -113,6 +117,9 @@ TEST_CASE("degenerate clouds have a hierarchy without a number that is not one")
       for (const float d : hierarchy.surface.detail[0]) CHECK(std::isfinite(d));
       for (const float h : hierarchy.spacing) CHECK(std::isfinite(h));
     }
+    const Hierarchy bands = built(cloud, {.scales = {0.1F, 0.02F, 0.0001F}});
+    check_shapes(cloud, bands, 3);
+    CHECK(identity_error(cloud, bands) < 1e-6);
   }
 }
 
@@ -184,6 +191,74 @@ TEST_CASE("closed smooth surfaces are decomposed without any failure") {
   }
 }
 
+TEST_CASE("many bands: each level is the base of the next finer one, at the scale asked for") {
+  for (const Surface& surface : {bumpy_sphere(30'000, {.count = 500, .height = 0.008, .width = 0.04}),
+                                 rippled(torus(30'000, 1.0, 0.4, Sampling::kRandom))}) {
+    const Cloud cloud = to_cloud(surface.position);
+    const HierarchyParams params{.scales = {0.06F, 0.03F, 0.015F}};
+    const Hierarchy hierarchy = built(cloud, params);
+    check_shapes(cloud, hierarchy, 3);
+    CHECK(identity_error(cloud, hierarchy) < 1e-6);
+    const auto diagonal = static_cast<double>(bounds_of(cloud.position).diagonal());
+    for (std::size_t band = 0; band < 3; ++band) {
+      CAPTURE(band);
+      const DecompositionReport& report = hierarchy.reports[band];
+      CHECK(report.at_limit == 0);
+      CHECK(report.fallback == 0);
+      CHECK(report.flipped == 0);
+      CHECK(relative_error(static_cast<double>(report.scale),
+                           static_cast<double>(params.scales[band]) * diagonal) < 0.02);
+      CHECK(count_opposed(hierarchy.surface.levels[band].normal, hierarchy.surface.finest().normal) == 0);
+    }
+    // The finest band is that of a hierarchy with this band alone, to the bit.
+    const Hierarchy alone = built(cloud, {.scales = {0.015F}});
+    CHECK(alone.surface.levels[0] == hierarchy.surface.levels[2]);
+    CHECK(alone.surface.detail[0] == hierarchy.surface.detail[2]);
+  }
+}
+
+TEST_CASE("each band holds the waves between its scales") {
+  // Two waves across each other, of 0.16 and 0.64: the scales stand between and beyond them. A Gaussian of
+  // standard deviation s leaves exp(-2 pi^2 s^2 / L^2) of a wave of length L.
+  constexpr double kPi = 3.14159265358979323846;
+  constexpr double kShort = 0.16;
+  constexpr double kLong = 0.64;
+  constexpr double kHeight = 0.004;
+  const Surface flat = plane(256, 0.01, Sampling::kJittered);
+  const Surface surface = displaced(flat, [](const Vec3d& p) {
+    return kHeight * (std::sin(2.0 * kPi * p.x() / kShort) + std::sin(2.0 * kPi * p.y() / kLong));
+  });
+  const Cloud cloud = to_cloud(surface);
+  const auto diagonal = static_cast<double>(bounds_of(cloud.position).diagonal());
+  const Hierarchy hierarchy =
+      built(cloud, {.scales = {static_cast<float>(0.30 / diagonal), static_cast<float>(0.08 / diagonal)}});
+  // Least-squares amplitudes of both waves in a level's heights, away from the border.
+  const auto amplitude = [&](const Level& level, bool along_x, double length) {
+    double sum = 0.0;
+    double squares = 0.0;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      const Vec3d p = cloud.position[i].cast<double>();
+      if (std::abs(p.x()) > 0.64 || std::abs(p.y()) > 0.64) continue;
+      const double s = std::sin(2.0 * kPi * (along_x ? p.x() : p.y()) / length);
+      sum += s * static_cast<double>(level.position[i].z());
+      squares += s * s;
+    }
+    return sum / squares / kHeight;
+  };
+  const auto kept = [&](double scale, double length) {
+    return std::exp(-2.0 * kPi * kPi * scale * scale / (length * length));
+  };
+  const std::vector<Level>& levels = hierarchy.surface.levels;
+  MESSAGE("of the short and the long wave level 1 keeps "
+          << amplitude(levels[1], true, kShort) << ", " << amplitude(levels[1], false, kLong) << ", level 0 "
+          << amplitude(levels[0], true, kShort) << ", " << amplitude(levels[0], false, kLong));
+  CHECK(std::abs(amplitude(levels[2], true, kShort) - 1.0) < 0.01);
+  CHECK(std::abs(amplitude(levels[1], true, kShort) - kept(0.08, kShort)) < 0.05);
+  CHECK(std::abs(amplitude(levels[1], false, kLong) - kept(0.08, kLong)) < 0.05);
+  CHECK(std::abs(amplitude(levels[0], true, kShort)) < 0.02);
+  CHECK(std::abs(amplitude(levels[0], false, kLong) - kept(0.30, kLong)) < 0.05);
+}
+
 TEST_CASE("uploaded normals are kept to the bit where they are unit, and made unit where they are not") {
   Surface surface = sphere(3'000, 1.0, Sampling::kRandom);
   surface.normal = scrambled_signs(surface.normal, 6);  // a file may say what it likes
@@ -226,6 +301,15 @@ TEST_CASE("parameters out of range are refused and named") {
   SUBCASE("scale infinite") {
     params.scales = {std::numeric_limits<float>::infinity()};
   }
+  SUBCASE("scales that ascend") {
+    params.scales = {0.01F, 0.02F};
+  }
+  SUBCASE("scales that are all but the same") {
+    params.scales = {0.02F, 0.0195F};
+  }
+  SUBCASE("too many scales") {
+    params.scales = {0.2F, 0.15F, 0.1F, 0.08F, 0.06F, 0.04F, 0.03F, 0.02F, 0.01F};
+  }
   SUBCASE("too few neighbours") {
     params.neighbors = 3, field = "neighbors";
   }
@@ -241,6 +325,7 @@ TEST_CASE("parameters out of range are refused and named") {
 
 TEST_CASE("the ends of the ranges are allowed") {
   CHECK(validate({.scales = {0.0001F}, .neighbors = 4}).ok());
+  CHECK(validate({.scales = {0.2F, 0.15F, 0.1F, 0.08F, 0.06F, 0.04F, 0.03F, 0.02F}}).ok());
   CHECK(validate({.scales = {0.2F}, .neighbors = 32}).ok());
 }
 
@@ -266,11 +351,12 @@ bool same(const Hierarchy& a, const Hierarchy& b) {
 
 TEST_CASE("the hierarchy has the same bytes for any thread count") {
   const Cloud cloud = to_cloud(with_noise(torus(40'000, 1.0, 0.4, Sampling::kRandom), 0.003).position);
+  const HierarchyParams params{.scales = {0.05F, 0.02F}};
   Hierarchy one;
-  with_threads(1, [&] { one = built(cloud); });
+  with_threads(1, [&] { one = built(cloud, params); });
   for (const int threads : {2, 8}) {
     CAPTURE(threads);
-    with_threads(threads, [&] { CHECK(same(built(cloud), one)); });
+    with_threads(threads, [&] { CHECK(same(built(cloud, params), one)); });
   }
 }
 

@@ -1,0 +1,119 @@
+#include "engine/multires/reconstruction.h"
+
+#include <algorithm>
+#include <string>
+
+#include "engine/core/check.h"
+#include "engine/core/parallel.h"
+#include "engine/multires/carried_normals_kernels.h"
+#include "engine/normals/estimation.h"
+#include "engine/normals/orientation.h"
+
+namespace pointwright {
+namespace {
+
+constexpr float kGreatestGain = 16.0F;
+
+// Positions of the level above `k`, from where level k has moved to.
+void rebuild_positions(const MultiresSurface& rest, std::size_t k, float gain, const Level& base,
+                       Level& above, const ExecutionContext* context) {
+  const Level& rest_base = rest.levels[k];
+  const Level& rest_above = rest.levels[k + 1];
+  const std::vector<float>& detail = rest.detail[k];
+  const auto rebuild = [&](const float* p, const float* r, const float* n, const float* r_now,
+                           const float* n_now, float* p_now, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      p_now[i] = p[i] + (r_now[i] - r[i]) + detail[i] * (gain * n_now[i] - n[i]);
+    }
+  };
+  parallel_for(
+      detail.size(),
+      [&](std::size_t begin, std::size_t end) {
+        rebuild(rest_above.position.x(), rest_base.position.x(), rest_base.normal.x(), base.position.x(),
+                base.normal.x(), above.position.x(), begin, end);
+        rebuild(rest_above.position.y(), rest_base.position.y(), rest_base.normal.y(), base.position.y(),
+                base.normal.y(), above.position.y(), begin, end);
+        rebuild(rest_above.position.z(), rest_base.position.z(), rest_base.normal.z(), base.position.z(),
+                base.normal.z(), above.position.z(), begin, end);
+      },
+      kParallelBlock, context);
+}
+
+// Normals of the level above `k`, whose samples have moved already.
+void carry(const MultiresSurface& rest, std::size_t k, const NeighborGraph& graph, const Level& base,
+           Level& above, const ExecutionContext* context) {
+  const auto columns = [](const Points& points, const float*(&to)[3]) {
+    to[0] = points.x();
+    to[1] = points.y();
+    to[2] = points.z();
+  };
+  CarryKernelArgs args{};
+  columns(rest.levels[k + 1].position, args.rest_position);
+  columns(rest.levels[k + 1].normal, args.rest_normal);
+  columns(above.position, args.position);
+  columns(rest.levels[k].normal, args.rest_base_normal);
+  columns(base.normal, args.base_normal);
+  args.neighbors = graph.lanes.data();
+  args.k = graph.k;
+  args.normal[0] = above.normal.x();
+  args.normal[1] = above.normal.y();
+  args.normal[2] = above.normal.z();
+  const auto kernel = POINTWRIGHT_KERNEL(carry_normals);
+  parallel_for(
+      graph.count, [&](std::size_t begin, std::size_t end) { kernel(args, begin, end); }, kParallelBlock,
+      context);
+}
+
+}  // namespace
+
+Result<void> validate(const ReconstructParams& params, const MultiresSurface& surface) {
+  const auto refuse = [](std::string message, const char* field, double limit, double actual) {
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = std::move(message),
+                 .field = field,
+                 .limit = limit,
+                 .actual = actual};
+  };
+  const std::size_t bands = surface.band_count();
+  if (params.level > bands)
+    return refuse("the surface has no such level", "level", static_cast<double>(bands),
+                  static_cast<double>(params.level));
+  if (!params.gains.empty() && params.gains.size() != bands)
+    return refuse("there is one gain for each band", "gains", static_cast<double>(bands),
+                  static_cast<double>(params.gains.size()));
+  for (const float gain : params.gains) {
+    if (!(gain >= -kGreatestGain && gain <= kGreatestGain))
+      return refuse("a gain lies within -16 and 16", "gains", static_cast<double>(kGreatestGain),
+                    static_cast<double>(gain));
+  }
+  return {};
+}
+
+Result<MultiresSurface> reconstruct(const MultiresSurface& surface, const NeighborGraph& graph,
+                                    const Level& moved, const ReconstructParams& params,
+                                    const ExecutionContext* context) {
+  if (auto valid = validate(params, surface); !valid) return valid.error();
+  POINTWRIGHT_CHECK(moved.position.size() == surface.sample_count() && graph.count == surface.sample_count(),
+                    "the moved level and the graph are of the surface's samples");
+  MultiresSurface result = surface;
+  result.levels[params.level] = moved;
+  for (std::size_t k = params.level; k < surface.band_count(); ++k) {
+    const float gain = params.gains.empty() ? 1.0F : params.gains[k];
+    const Level& base = result.levels[k];
+    Level& above = result.levels[k + 1];
+    rebuild_positions(surface, k, gain, base, above, context);
+    if (params.normals == RebuiltNormals::kReestimated) {
+      const Points rest_normal = above.normal;
+      estimate_normals(above.position, graph, NormalParams{}, above.normal, context);
+      orient_like(rest_normal, above.normal);
+    } else {
+      carry(surface, k, graph, base, above, context);
+    }
+    if (gain != 1.0F)
+      for (float& d : result.detail[k]) d *= gain;
+    if (context != nullptr && context->is_cancelled()) return cancelled_error();
+  }
+  return result;
+}
+
+}  // namespace pointwright
