@@ -8,6 +8,7 @@
 
 #include "engine/core/median.h"
 #include "engine/core/parallel.h"
+#include "engine/smoothing/umbrella_steps.h"
 
 namespace pointwright {
 namespace {
@@ -176,57 +177,53 @@ std::vector<double> greatest_variances(const Points& points, const NeighborGraph
 
 KernelVariance::KernelVariance(const Points& points, const Points& normals, const NeighborGraph& graph,
                                SmoothingDirection direction)
-    : graph_(&graph), is_free_(direction == SmoothingDirection::kFree), columns_(is_free_ ? 4 : 1) {
-  for (auto& c : columns_) c.resize(points.size());
-  if (!is_free_) {
-    weights_ = level_weights(points, normals, graph);
-    first_gain_ = mean_squares(points, graph);
-    gain_ = mean_squares(points, graph, weights_);
-    rate_ = step_rates(first_gain_, graph);
-    most_ = greatest_variances(points, graph);
+    : graph_(&graph) {
+  if (direction == SmoothingDirection::kFree) {
+    rest_ = Packed(points);
+    state_.spread = rest_;
     return;
   }
-  const Box3f box = bounds_of(points);
-  const Vec3f center = 0.5F * (box.min + box.max);
-  for_each_sample(points.size(), [&](std::size_t i) {
-    const Vec3d p = (points[i] - center).cast<double>();
-    for (std::size_t axis = 0; axis < 3; ++axis) columns_[axis][i] = p[static_cast<Eigen::Index>(axis)];
-    columns_[3][i] = p.squaredNorm();
-  });
+  weights_ = level_weights(points, normals, graph);
+  first_gain_ = mean_squares(points, graph);
+  gain_ = mean_squares(points, graph, weights_);
+  rate_ = step_rates(first_gain_, graph);
+  most_ = greatest_variances(points, graph);
+  state_.variance.assign(points.size(), 0.0);
 }
 
-KernelVariance::Columns KernelVariance::stepped(double lambda) const {
-  Columns result(columns_.size(), std::vector<double>(graph_->count));
-  const double uniform = 1.0 / static_cast<double>(graph_->k);
-  for (std::size_t column = 0; column < columns_.size(); ++column) {
-    const std::vector<double>& c = columns_[column];
-    for_each_sample(graph_->count, [&](std::size_t i) {
-      double sum = 0.0;
-      for (std::uint32_t j = 0; j < graph_->k; ++j) {
-        const double weight = is_free_ ? uniform : static_cast<double>(weights_[slot_of(*graph_, i, j)]);
-        sum += weight * (c[graph_->index(i, j)] - c[i]);
-      }
-      if (is_free_) {
-        result[column][i] = c[i] + lambda * sum;
-        return;
-      }
-      const double gain = is_first_ ? first_gain_[i] : gain_[i];
-      result[column][i] = std::min(c[i] + lambda * rate_[i] * (sum + gain), most_[i]);
-    });
+KernelVariance::State KernelVariance::stepped(double lambda) const {
+  State result;
+  if (rate_.empty()) {
+    result.spread = Packed(graph_->count);
+    spread_step(*graph_, static_cast<float>(lambda), rest_, state_.spread, result.spread);
+    return result;
   }
+  const std::vector<double>& c = state_.variance;
+  result.variance.resize(c.size());
+  for_each_sample(c.size(), [&](std::size_t i) {
+    double sum = 0.0;
+    for (std::uint32_t j = 0; j < graph_->k; ++j) {
+      sum += static_cast<double>(weights_[slot_of(*graph_, i, j)]) * (c[graph_->index(i, j)] - c[i]);
+    }
+    const double gain = is_first_ ? first_gain_[i] : gain_[i];
+    result.variance[i] = std::min(c[i] + lambda * rate_[i] * (sum + gain), most_[i]);
+  });
   return result;
 }
 
-void KernelVariance::take(Columns stepped) {
-  columns_ = std::move(stepped);
+void KernelVariance::take(State stepped) {
+  state_ = std::move(stepped);
   is_first_ = false;
 }
 
-double KernelVariance::median(const Columns& columns) const {
-  std::vector<double> variance = columns.back();
-  if (is_free_) {
-    for_each_sample(graph_->count, [&](std::size_t i) {
-      for (std::size_t axis = 0; axis < 3; ++axis) variance[i] -= columns[axis][i] * columns[axis][i];
+double KernelVariance::median(const State& state) const {
+  std::vector<double> variance = state.variance;
+  if (rate_.empty()) {
+    variance.resize(graph_->count);
+    for_each_sample(variance.size(), [&](std::size_t i) {
+      const Float4 q = state.spread.data()[i];
+      const Vec3f drift = state.spread[i] - rest_[i];
+      variance[i] = static_cast<double>(q[3]) - drift.cast<double>().squaredNorm();
     });
   }
   return 0.5 * std::max(0.0, pointwright::median(std::move(variance)));

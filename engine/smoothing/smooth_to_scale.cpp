@@ -43,7 +43,7 @@ Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& norm
   double first_gain = 0.0;
   while (reached < goal * (1.0 - 1e-3) && result.iterations < max_iterations) {
     if (context != nullptr && context->is_cancelled()) return cancelled_error();
-    KernelVariance::Columns trial = variance.stepped(static_cast<double>(kLambda));
+    KernelVariance::State trial = variance.stepped(static_cast<double>(kLambda));
     double next = variance.median(trial);
     if (result.iterations == 0) first_gain = next;
     if (next - reached <= kExhausted * first_gain) break;

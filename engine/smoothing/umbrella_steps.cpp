@@ -115,4 +115,31 @@ void compensated_step(const UmbrellaOperator& umbrella, const ReverseNeighbors& 
   });
 }
 
+// K' = (1 - lambda) K + lambda W K, and about another center: sum_m K_jm |r_m - r_i|^2 = S_j + 2 (q_j - r_j) .
+// (r_j - r_i) + |r_j - r_i|^2, q_j = sum_m K_jm r_m being sample j's position now.
+void spread_step(const NeighborGraph& graph, float lambda, const Packed& rest, const Packed& from,
+                 Packed& to) {
+  const Float4* r = rest.data();
+  const Float4* q = from.data();
+  const float factor = lambda / static_cast<float>(graph.k);
+  parallel_for(from.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < padded_to_block(end); ++i) {
+      const std::uint32_t* row = graph.lanes.data() + i / kSimdBlock * graph.k * kSimdBlock + i % kSimdBlock;
+      Float4 sum{};
+      Float4 shift{};
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        const std::uint32_t other = row[j * kSimdBlock];
+        Float4 drift = q[other] - r[other];
+        drift[3] = 0.0F;
+        Float4 e = r[other] - r[i];
+        e[3] = 0.0F;
+        sum += q[other] - q[i];
+        shift += (drift + drift + e) * e;
+      }
+      sum[3] += (shift[0] + shift[1]) + shift[2];
+      to.data()[i] = q[i] + sum * factor;
+    }
+  });
+}
+
 }  // namespace pointwright

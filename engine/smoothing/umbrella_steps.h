@@ -29,4 +29,11 @@ void plain_step(const UmbrellaOperator& umbrella, float lambda, const Packed& fr
 void compensated_step(const UmbrellaOperator& umbrella, const ReverseNeighbors& listers, float lambda,
                       Packed& points, Packed& change);
 
+/// A plain, free, uniform step of positions that carries along, in the fourth lane, the second moment of the
+/// weights about the rest position: S_i = sum_j K_ij |rest_j - rest_i|^2, K the weights of all steps so far.
+/// S_i less the squared distance of `from` and rest is the variance of sample i's weights. From lane 3 = 0 at
+/// rest. Everything is relative to the sample, so floats are enough, however far away 0 is.
+void spread_step(const NeighborGraph& graph, float lambda, const Packed& rest, const Packed& from,
+                 Packed& to);
+
 }  // namespace pointwright
