@@ -1,12 +1,9 @@
 #include "engine/core/parallel.h"
 
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <array>
-#include <optional>
+
+#include "engine/core/worker_threads.h"
 
 namespace pointwright {
 
@@ -22,7 +19,7 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t, std::
     run(0);
     return;
   }
-  tbb::parallel_for(std::size_t{0}, blocks, run);
+  share_work(blocks, run);
 }
 
 void sort_by_key(std::vector<std::uint64_t>& keys, std::vector<std::uint32_t>& values) {
@@ -73,23 +70,6 @@ void sort_by_key(std::vector<std::uint64_t>& keys, std::vector<std::uint32_t>& v
     keys.swap(key_buffer);
     values.swap(value_buffer);
   }
-}
-
-void with_threads(int threads, const std::function<void()>& work) {
-  // TBB starts no more workers than the machine has processors, whatever an arena asks for. Raised only: a
-  // control below that number would bind every other thread of the process, too.
-  using Control = tbb::global_control;
-  std::optional<Control> more;
-  if (threads > 0 &&
-      static_cast<std::size_t>(threads) > Control::active_value(Control::max_allowed_parallelism)) {
-    more.emplace(Control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  }
-  tbb::task_arena arena(threads <= 0 ? tbb::task_arena::automatic : threads);
-  arena.execute(work);
-}
-
-int thread_count() {
-  return tbb::this_task_arena::max_concurrency();
 }
 
 }  // namespace pointwright

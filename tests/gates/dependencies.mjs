@@ -27,7 +27,7 @@ const fenced = [
   { name: "sockets", header: /^(sys\/socket|netinet\/.*|arpa\/.*|netdb)\.h$/, allowed: /^(server|tests)\// },
   { name: "Draco", header: /^draco\//, allowed: /^(engine\/io|tests)\// },
   { name: "nanoflann", header: /^nanoflann/, allowed: /^(engine\/spatial|tests)\// },
-  { name: "TBB", header: /^(oneapi|tbb)\//, allowed: /^(engine\/core\/parallel|tests\/)/ },
+  { name: "TBB", header: /^(oneapi|tbb)\//, allowed: /^(engine\/core\/worker_threads|tests\/)/ },
   {
     name: "threads",
     header: /^(thread|future|execution)$/,
