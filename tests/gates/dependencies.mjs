@@ -31,7 +31,7 @@ const fenced = [
   {
     name: "threads",
     header: /^(thread|future|execution)$/,
-    allowed: /^(engine\/core\/parallel|server\/|tests\/)/,
+    allowed: /^(engine\/core\/worker_threads|server\/|tests\/)/,
   },
   { name: "doctest", header: /^doctest\//, allowed: /^tests\// },
 ];
