@@ -5,7 +5,9 @@
 
 namespace pointwright::bench {
 
+void bench_spatial(BenchReport& report);
 void bench_multires(BenchReport& report);
+void bench_smoothing(BenchReport& report);
 void bench_editing(BenchReport& report);
 void bench_frames(BenchReport& report);
 void bench_session(BenchReport& report);
