@@ -16,7 +16,6 @@
 namespace pointwright {
 namespace {
 
-constexpr std::size_t kRegion = 8192;  // samples; what a region works on fits a core's own cache
 constexpr std::size_t kCancelInterval = std::size_t{1} << 16;
 constexpr std::uint16_t kUntouched = std::numeric_limits<std::uint16_t>::max();
 
@@ -152,7 +151,7 @@ class ForestBuilder {
         normals_(normals),
         context_(context),
         touch_(points.size(), kUntouched),
-        pending_((points.size() + kRegion - 1) / kRegion) {
+        pending_((points.size() + kSpanRegion - 1) / kSpanRegion) {
     forest_.root.resize(points.size());
     forest_.opposed.resize(points.size());
   }
@@ -160,9 +159,9 @@ class ForestBuilder {
   SidedForest build() {
     const auto weigh = [&](std::size_t begin, std::size_t end) { weigh_edges_out(begin, end); };
     const auto span_one = [&](std::size_t begin, std::size_t end) { span_region(begin, end); };
-    parallel_for(points_.size(), weigh, kRegion, context_);
+    parallel_for(points_.size(), weigh, kSpanRegion, context_);
     if (is_cancelled()) return {};
-    parallel_for(points_.size(), span_one, kRegion, context_);
+    parallel_for(points_.size(), span_one, kSpanRegion, context_);
     if (is_cancelled() || !join_regions()) return {};
     return std::move(forest_);
   }
@@ -172,7 +171,7 @@ class ForestBuilder {
 
   // Collects the edges that leave a region, each once, and tells both their ends how light they are.
   void weigh_edges_out(std::size_t begin, std::size_t end) {
-    std::vector<Edge>& out = pending_[begin / kRegion];
+    std::vector<Edge>& out = pending_[begin / kSpanRegion];
     const auto add = [&](std::size_t a, std::size_t b) {
       const Edge edge{static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b),
                       pack_edge(points_, normals_, a, b)};
@@ -256,7 +255,7 @@ class ForestBuilder {
     std::iota(parent.begin(), parent.end(), 0U);
     std::vector<std::uint8_t> opposed(n, 0);
     SidedSets sets(parent, opposed);
-    std::vector<Edge>& pending = pending_[begin / kRegion];
+    std::vector<Edge>& pending = pending_[begin / kSpanRegion];
     const auto first = static_cast<std::uint32_t>(begin);
     const EdgeList list = edges_inside(begin, end);
     for (const std::uint64_t edge : std::span(list.edges.get(), list.count)) {

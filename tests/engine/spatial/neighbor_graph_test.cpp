@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <set>
 #include <string>
 
 #include "engine/core/parallel.h"
+#include "engine/core/simd_dispatch.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -160,6 +162,60 @@ TEST_CASE("the graph does not depend on the threads") {
   for (const int threads : {2, 8}) {
     with_threads(threads, [&] { CHECK(build_neighbor_graph(points, 10).lanes == one.lanes); });
   }
+}
+
+TEST_CASE("clouds that fill their boxes in every way have the lists of brute force") {
+  // Around whole blocks of samples, and around whole blocks of those.
+  for (const std::size_t n : {15U, 16U, 17U, 32U, 33U, 255U, 256U, 257U, 4097U}) {
+    CAPTURE(n);
+    const Points points = random_points(n, n);
+    CHECK(count_wrong_lists(points, build_neighbor_graph(points, 8)) == 0);
+  }
+  // Lists longer than a block, and nearly as long as the cloud.
+  const Points few = random_points(300, 12);
+  for (const std::uint32_t k : {17U, 48U, 100U, 298U, 299U}) {
+    CAPTURE(k);
+    CHECK(count_wrong_lists(few, build_neighbor_graph(few, k)) == 0);
+  }
+}
+
+TEST_CASE("outliers, clusters, lines and any order have the lists of brute force") {
+  Random random(13);
+  Points clusters(2000);
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    const double size = std::pow(10.0, -static_cast<double>(i % 5));
+    const Vec3d center = 10.0 * Vec3d(static_cast<double>(i % 7), static_cast<double>(i % 3), 0.0);
+    clusters.set(i, (center + size * random.direction()).cast<float>());
+  }
+  Points outliers = random_points(2000, 14);
+  for (std::size_t i = 0; i < 2000; i += 97) outliers.set(i, (1000.0 * random.direction()).cast<float>());
+  outliers = coherent(outliers);
+  Points unordered = random_points(2000, 15);
+  for (std::size_t i = 0; i < 1000; ++i) {
+    const Vec3f here = unordered[i];
+    const std::size_t other = random.below(2000);
+    unordered.set(i, unordered[other]);
+    unordered.set(other, here);
+  }
+  for (const Points& points : {coherent(clusters), outliers, unordered, collinear(1500, {0, 0, 0}, {1, 2, 3}),
+                               moved(sphere(1500, 1.0, Sampling::kRandom), {1e6, -1e6, 1e6}).position,
+                               parallel_sheets(25, 1.0, 0.1, Sampling::kJittered).position}) {
+    CHECK(count_wrong_lists(points, build_neighbor_graph(points, 10)) == 0);
+  }
+}
+
+TEST_CASE("every instruction set finds the same graph") {
+  Points points = with_noise(torus(20'003, 1.0, 0.4, Sampling::kRandom), 0.003).position;
+  for (std::size_t i = 0; i < 2000; ++i) points.set(7 * i + 1, points[7 * i]);
+  points = coherent(points);
+  const SimdLevel before = simd_level();
+  set_simd_level(SimdLevel::kBase);
+  const NeighborGraph reference = build_neighbor_graph(points, 10);
+  for (const SimdLevel level : {SimdLevel::kV3, SimdLevel::kV4}) {
+    set_simd_level(level);
+    CHECK(build_neighbor_graph(points, 10).lanes == reference.lanes);
+  }
+  set_simd_level(before);
 }
 
 TEST_CASE("a cancelled graph returns at once") {
