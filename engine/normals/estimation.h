@@ -17,8 +17,8 @@ struct NormalParams {
 };
 
 /// Unit normals of all samples, their sides undetermined (see orientation.h). The sample itself counts with
-/// weight 1; r is the distance to its farthest neighbour. Degenerate neighbourhoods (collinear, coincident, fewer
-/// than two neighbours) get some unit vector across their direction; returns how many there are.
+/// weight 1; r is the distance to its farthest neighbour. Degenerate neighbourhoods (collinear, coincident,
+/// fewer than two neighbours) get some unit vector across their direction; returns how many there are.
 /// Paper:       §2.2, Eq. (2)-(4)
 /// Shapes:      N points and their graph; `normal` is resized to N
 /// Errors:      none; LogicError for a sigma out of range or a graph of other points

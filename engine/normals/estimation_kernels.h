@@ -8,8 +8,8 @@
 
 namespace pointwright {
 
-/// Padded columns; `neighbors` has the rows of the first block that the kernel is called for and of those after
-/// it, [block][j][lane]. A neighbour that is the sample itself counts for nothing: it fills short rows.
+/// Padded columns; `neighbors` has the rows of the first block that the kernel is called for and of those
+/// after it, [block][j][lane]. A neighbour that is the sample itself counts for nothing: it fills short rows.
 struct NormalKernelArgs {
   const float* x;
   const float* y;

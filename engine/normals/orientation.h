@@ -16,11 +16,12 @@ struct OrientationReport {
   std::size_t small_components = 0;
 };
 
-/// Flips normals in place so that neighbours agree along the minimum spanning forest of the neighbour graph under
-/// the reflected criterion (spanning_forest.h): on a circular arc the reflected normal equals its neighbour's
-/// exactly, so creases and thin sheets keep their sides where the plain n_a . n_b fails. Each component is
-/// turned outward at its most extreme sample. Where two sheets stand so close that the estimated normals
-/// mix them (a gap below a quarter of the neighbourhood's radius), no criterion on normals can tell them apart.
+/// Flips normals in place so that neighbours agree along the minimum spanning forest of the neighbour graph
+/// under the reflected criterion (spanning_forest.h): on a circular arc the reflected normal equals its
+/// neighbour's exactly, so creases and thin sheets keep their sides where the plain n_a . n_b fails. Each
+/// component is turned outward at its most extreme sample. Where two sheets stand so close that the estimated
+/// normals mix them (a gap below a quarter of the neighbourhood's radius), no criterion on normals can tell
+/// them apart.
 /// Shapes:      N points, N unit normals, their graph
 /// Cost:        O(N k alpha(N)), nearly all of it parallel; about 20 bytes a sample while it runs
 /// Determinism: bitwise equal for any thread count and instruction set

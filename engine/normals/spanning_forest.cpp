@@ -41,8 +41,8 @@ std::uint32_t pack_edge(const Points& points, const Points& normals, std::size_t
   return (static_cast<std::uint32_t>(weight) << 1) | (agreement < 0.0F ? 1U : 0U);
 }
 
-// Disjoint sets that remember, per element, whether its side is opposed to that of its set's root, which is the
-// lowest element.
+// Disjoint sets that remember, per element, whether its side is opposed to that of its set's root, which is
+// the lowest element.
 class SidedSets {
  public:
   SidedSets(std::span<std::uint32_t> parent, std::span<std::uint8_t> opposed)
@@ -83,13 +83,13 @@ class SidedSets {
   std::span<std::uint8_t> opposed_;
 };
 
-// The trees that the edges of a region make when they come by weight. A tree's elements carry its label, and the
-// smaller one's are relabelled when two are joined: nearly all edges find equal labels, with two loads.
+// The trees that the edges of a region make when they come by weight. A tree's elements carry its label, and
+// the smaller one's are relabelled when two are joined: nearly all edges find equal labels, with two loads.
 //
-// Whether an edge is certain to be in the forest of the whole graph: when one of the two trees has no edge out
-// of the region that is as light (the cut property). A tree that is held together by uncertain edges has such an
-// edge in each of its parts, for both ends of an uncertain edge had; so the lightest edge out of the whole tree
-// tells of its parts.
+// Whether an edge is certain to be in the forest of the whole graph: when one of the two trees has no edge
+// out of the region that is as light (the cut property). A tree that is held together by uncertain edges has
+// such an edge in each of its parts, for both ends of an uncertain edge had; so the lightest edge out of the
+// whole tree tells of its parts.
 class LabelledTrees {
  public:
   // lightest_out: the least weight of the edges that leave the region at each element.

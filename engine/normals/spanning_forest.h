@@ -26,10 +26,10 @@ struct SidedForest {
 /// 65,536 steps and the sides are opposed where r . n_b < 0.
 ///
 /// Regions of consecutive samples are spanned at the same time. Inside one, Kruskal's algorithm joins two
-/// trees while one of them has no lighter edge that leaves the region: such an edge is in every minimum spanning
-/// forest (the cut property). What is left, the edges between regions and between trees that wait for them, is
-/// a small graph that one thread finishes. Of equal weights those count as lighter that come from an earlier
-/// region, then those that leave it, then the earlier samples.
+/// trees while one of them has no lighter edge that leaves the region: such an edge is in every minimum
+/// spanning forest (the cut property). What is left, the edges between regions and between trees that wait
+/// for them, is a small graph that one thread finishes. Of equal weights those count as lighter that come
+/// from an earlier region, then those that leave it, then the earlier samples.
 /// Shapes:      N points, N unit normals, their graph
 /// Cost:        O(N k alpha(N)); 8 bytes a sample, and the edges of one region a thread
 /// Determinism: bitwise equal for any thread count and instruction set

@@ -30,13 +30,13 @@ struct RegionEdgesArgs {
 
 }  // namespace pointwright
 
-/// The edges of the samples [begin, end), both at whole blocks: `edges` takes [block][j][lane] from begin's block
-/// on, twice the weight (0 to 65,535) plus 1 where the sides are opposed.
+/// The edges of the samples [begin, end), both at whole blocks: `edges` takes [block][j][lane] from begin's
+/// block on, twice the weight (0 to 65,535) plus 1 where the sides are opposed.
 POINTWRIGHT_DECLARE_KERNEL(void edge_weights_kernel(const EdgeWeightArgs& args, std::size_t begin,
                                                     std::size_t end, std::int32_t* edges))
 
-/// Those edges of the region [begin, end) that have both ends in it, each once, ordered by sample, then neighbour:
-/// weight, first end and second end in 16 bits each (ends count from `begin`), and the side in the lowest bit.
-/// Returns how many; `edges` has room for k a sample and one more.
+/// Those edges of the region [begin, end) that have both ends in it, each once, ordered by sample, then
+/// neighbour: weight, first end and second end in 16 bits each (ends count from `begin`), and the side in the
+/// lowest bit. Returns how many; `edges` has room for k a sample and one more.
 POINTWRIGHT_DECLARE_KERNEL(std::size_t region_edges_kernel(const RegionEdgesArgs& args, std::size_t begin,
                                                            std::size_t end, std::uint64_t* edges))

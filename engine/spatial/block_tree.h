@@ -11,8 +11,9 @@ namespace pointwright {
 
 struct BlockTreeLevel;
 
-/// Boxes around every 16 consecutive samples, around every 16 of those boxes, and so on up to 16: what coherent
-/// order leaves to build of a search tree. It refers to the points, which must outlive it and stay unmoved.
+/// Boxes around every 16 consecutive samples, around every 16 of those boxes, and so on up to 16: what
+/// coherent order leaves to build of a search tree. It refers to the points, which must outlive it and stay
+/// unmoved.
 /// Pre:  finite coordinates within 1e9; coherent order makes it fast, any order is legal
 /// Cost: O(N) to build, parallel; 1.6 bytes a sample
 class BlockTree {
@@ -26,8 +27,8 @@ class BlockTree {
 
   /// Lists the nearest other samples of samples [begin, end), by distance, then index: at most `length` each,
   /// and only those whose squared distance, computed in float, is below `bound_sq`. `rows` becomes
-  /// [block][j][lane], kSimdBlock lanes, of indices; -1 past a list's end and in the lanes past the last sample.
-  /// Samples that stand in one place list each other: many such make many searches dear.
+  /// [block][j][lane], kSimdBlock lanes, of indices; -1 past a list's end and in the lanes past the last
+  /// sample. Samples that stand in one place list each other: many such make many searches dear.
   /// Pre:         begin a multiple of kSimdBlock; length >= 1; bound_sq not NaN
   /// Determinism: the answer is unique
   void nearest_of_range(std::size_t begin, std::size_t end, std::uint32_t length, float bound_sq,

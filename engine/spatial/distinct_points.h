@@ -10,8 +10,8 @@
 namespace pointwright {
 
 /// Points without the exact duplicates that stand next to each other in the order: a pile of them would make
-/// every search near it visit them all. Refers to the points, which must outlive it; without duplicates it holds
-/// nothing else.
+/// every search near it visit them all. Refers to the points, which must outlive it; without duplicates it
+/// holds nothing else.
 /// Cost:        O(N), parallel
 /// Determinism: bitwise equal for any thread count
 class DistinctPoints {

@@ -23,9 +23,9 @@ struct RadiusParams {
   friend bool operator==(const RadiusParams&, const RadiusParams&) = default;
 };
 
-/// The neighbours of all samples within a radius, one list after the other, each ordered by distance, then index.
-/// As in NeighborGraph, adjacent duplicates have equal lists, and no list contains the sample itself or an exact
-/// duplicate of it.
+/// The neighbours of all samples within a radius, one list after the other, each ordered by distance, then
+/// index. As in NeighborGraph, adjacent duplicates have equal lists, and no list contains the sample itself
+/// or an exact duplicate of it.
 struct RadiusGraph {
   std::vector<std::uint64_t> first;      ///< N + 1: the list of sample i is [first[i], first[i + 1])
   std::vector<std::uint32_t> neighbors;  ///< all the lists
@@ -45,8 +45,8 @@ Result<void> validate(const RadiusParams& params);
 /// Paper:       §2.1
 /// Pre:         exact duplicates adjacent, as in coherent order, which is also what makes it fast
 /// Errors:      kInvalidArgument (radius, limit), kCancelled
-/// Cost:        O(N m + N log N) time for m neighbours a sample, m at most the limit; 8 + 4 m bytes a sample, twice
-///              that while it is built
+/// Cost:        O(N m + N log N) time for m neighbours a sample, m at most the limit; 8 + 4 m bytes a sample,
+///              twice that while it is built
 /// Determinism: bitwise equal for any thread count and instruction set
 /// Cancels:     between blocks of samples
 Result<RadiusGraph> build_radius_graph(const Points& points, const RadiusParams& params,

@@ -149,9 +149,9 @@ Surface torus_lattice(std::size_t side) {
 }
 
 TEST_CASE("on an even sampling the error is of second order in the spacing") {
-  // In the tangent frame z = c x^2 / 2 + c' x^3 / 6 + ...; the fitted plane tilts by sum w x z / sum w x^2. The
-  // quadratic term gives c sum w x^3 / (2 sum w x^2), of first order, but nothing where the neighbourhood is
-  // symmetric; the cubic one c' sum w x^4 / (6 sum w x^2), about c' r^2 / 12 at most. These lattices are
+  // In the tangent frame z = c x^2 / 2 + c' x^3 / 6 + ...; the fitted plane tilts by sum w x z / sum w x^2.
+  // The quadratic term gives c sum w x^3 / (2 sum w x^2), of first order, but nothing where the neighbourhood
+  // is symmetric; the cubic one c' sum w x^4 / (6 sum w x^2), about c' r^2 / 12 at most. These lattices are
   // symmetric up to terms of the next order, and all neighbours within a radius keep that symmetry (the k
   // nearest cut a shell in two): halving the spacing leaves a quarter, a sixteenth in two steps. A shell that
   // crosses the sphere on one side only tilts by a first-order step, but at a share of the samples that falls

@@ -71,8 +71,9 @@ TEST_CASE("a bumpy sphere points outward in its hollows, too") {
 
 TEST_CASE("two sheets closer than a spacing keep their two sides") {
   // The nearest neighbours of a sample lie on the other sheet: n_a . n_b would turn one of them over.
-  // At a gap g the sheets are told apart by a pair of samples that face each other within some g^2 / 2 spacings:
-  // its reflection weighs less than that of a long flat edge across. A fifth of a spacing leaves few such pairs.
+  // At a gap g the sheets are told apart by a pair of samples that face each other within some g^2 / 2
+  // spacings: its reflection weighs less than that of a long flat edge across. A fifth of a spacing leaves
+  // few such pairs.
   for (const double gap : {0.2, 0.5, 0.8, 1.5}) {
     CAPTURE(gap);
     const Surface sheets = parallel_sheets(60, 1.0, gap, Sampling::kJittered);
