@@ -78,7 +78,7 @@ Result<GlobalVolume> GlobalVolume::of(const Points& points, const Points& normal
   GlobalVolume result(graph, std::move(area), normals);
   result.average_normals();
   const Moments now = result.moments(Packed(points));
-  if (!(now.area > 0.0 && std::abs(now.volume) > kLeastVolume * std::pow(now.area, 1.5))) {
+  if (!(now.area > 0.0 && std::abs(now.volume) > kLeastVolume * now.area * std::sqrt(now.area))) {
     return no_volume(
         "global rescaling needs samples that enclose a volume, with normals on consistent sides");
   }

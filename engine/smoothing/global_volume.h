@@ -25,7 +25,7 @@ class GlobalVolume {
   /// Errors: kInvalidArgument (field "preserve") for samples that enclose no volume: where the area vectors
   ///         add up to more than 0.1 + 1 / sqrt N of the area, the surface is open (a hole of a tenth of a
   ///         sphere's area gives 0.1, half a sphere 0.5); where the volume is nearly nothing, the samples lie
-  ///         in a plane or on a line, or their normals have no consistent sides
+  ///         in a plane or on a line
   /// Pre:    unit normals on consistent sides, inward or outward
   /// Cost:   O(N k), parallel; bitwise equal for any thread count
   static Result<GlobalVolume> of(const Points& points, const Points& normals, const NeighborGraph& graph);

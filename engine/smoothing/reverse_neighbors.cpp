@@ -15,21 +15,31 @@ struct Rows {
   std::vector<std::uint32_t> entry;
 };
 
+// Calls visit(i, neighbour) for every entry of the graph, sample by sample.
+template <typename Visit>
+void for_each_entry(const NeighborGraph& graph, Visit visit) {
+  for (std::size_t block = 0; block * kSimdBlock < graph.count; ++block) {
+    const std::uint32_t* rows = graph.lanes.data() + block * graph.k * kSimdBlock;
+    const std::size_t lanes = std::min(kSimdBlock, graph.count - block * kSimdBlock);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        visit(static_cast<std::uint32_t>(block * kSimdBlock + lane), rows[j * kSimdBlock + lane]);
+      }
+    }
+  }
+}
+
 Rows transposed(const NeighborGraph& graph) {
   Rows rows;
   rows.first.assign(padded_to_block(graph.count) + 1, 0);
-  std::uint32_t* first = rows.first.data();
-  for (std::size_t i = 0; i < graph.count; ++i) {
-    for (std::uint32_t j = 0; j < graph.k; ++j) ++first[graph.index(i, j) + 1U];
-  }
+  std::uint32_t* count = rows.first.data() + 1;
+  for_each_entry(graph, [&](std::uint32_t, std::uint32_t neighbor) { ++count[neighbor]; });
   std::partial_sum(rows.first.begin(), rows.first.end(), rows.first.begin());
   rows.entry.resize(graph.count * graph.k);
-  std::vector<std::uint32_t> cursor(rows.first.begin(), rows.first.end() - 1);
-  for (std::size_t i = 0; i < graph.count; ++i) {
-    for (std::uint32_t j = 0; j < graph.k; ++j) {
-      rows.entry[cursor[graph.index(i, j)]++] = static_cast<std::uint32_t>(i);
-    }
-  }
+  std::vector<std::uint32_t> cursors(rows.first.begin(), rows.first.end() - 1);
+  std::uint32_t* cursor = cursors.data();
+  std::uint32_t* entry = rows.entry.data();
+  for_each_entry(graph, [&](std::uint32_t i, std::uint32_t neighbor) { entry[cursor[neighbor]++] = i; });
   return rows;
 }
 
@@ -40,7 +50,8 @@ ReverseNeighbors reverse_neighbors(const NeighborGraph& graph) {
   const Rows plain = transposed(graph);
   const std::size_t slices = padded_to_block(graph.count) / kReverseLanes;
   const std::uint32_t most = 2 * graph.k;
-  const auto length = [&](std::size_t i) { return plain.first[i + 1] - plain.first[i]; };
+  const std::uint32_t* plain_first = plain.first.data();
+  const auto length = [plain_first](std::size_t i) { return plain_first[i + 1] - plain_first[i]; };
 
   ReverseNeighbors result;
   result.nothing = static_cast<std::uint32_t>(padded_to_block(graph.count));
@@ -59,6 +70,7 @@ ReverseNeighbors reverse_neighbors(const NeighborGraph& graph) {
     result.slice_first[slice + 1] = result.slice_first[slice] + std::min(longest, most);
   }
   result.rows.resize(result.slice_first[slices] * kReverseLanes);
+  const std::uint32_t nothing = result.nothing;
   parallel_for(
       slices,
       [&](std::size_t begin, std::size_t end) {
@@ -67,9 +79,10 @@ ReverseNeighbors reverse_neighbors(const NeighborGraph& graph) {
           std::uint32_t* to = result.rows.data() + result.slice_first[slice] * kReverseLanes;
           for (std::size_t lane = 0; lane < kReverseLanes; ++lane) {
             const std::size_t i = slice * kReverseLanes + lane;
-            const std::uint32_t* from = plain.entry.data() + plain.first[i];
+            const std::uint32_t listers = length(i);
+            const std::uint32_t* from = plain.entry.data() + plain_first[i];
             for (std::uint32_t row = 0; row < count; ++row) {
-              to[row * kReverseLanes + lane] = row < length(i) ? from[row] : result.nothing;
+              to[row * kReverseLanes + lane] = row < listers ? from[row] : nothing;
             }
           }
         }

@@ -76,7 +76,7 @@ NeighborGraph same_side_graph(const Points& position, const Points& normal, cons
   return graph;
 }
 
-// Children of each coarse sample, and where it stands next to their mean.
+// Children of each coarse sample.
 void link_children(const Points& fine, CoarseLevel& level) {
   const std::size_t count = level.position.size();
   level.child_first.assign(count + 1, 0);
@@ -88,12 +88,19 @@ void link_children(const Points& fine, CoarseLevel& level) {
   level.child.resize(fine.size());
   std::vector<std::uint32_t> cursor(level.child_first.begin(), level.child_first.end() - 1);
   for (std::uint32_t i = 0; i < fine.size(); ++i) level.child[cursor[level.parent[i]]++] = i;
-  level.child_offset.resize(count);
-  parallel_for(count, [&](std::size_t begin, std::size_t end) {
+  for (std::size_t m = 0; m < count; ++m) {
+    POINTWRIGHT_CHECK(level.child_first[m] < level.child_first[m + 1],
+                      "every coarse sample must have children");
+  }
+}
+
+// Where each coarse sample stands next to the mean of its children.
+void set_offsets(const Points& fine, CoarseLevel& level) {
+  level.child_offset.resize(level.position.size());
+  parallel_for(level.position.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t m = begin; m < end; ++m) {
       const std::uint32_t first = level.child_first[m];
       const std::uint32_t last = level.child_first[m + 1];
-      POINTWRIGHT_CHECK(first < last, "every coarse sample must have children");
       Vec3d offset = Vec3d::Zero();
       for (std::uint32_t c = first; c < last; ++c) {
         offset += (level.position[m] - fine[level.child[c]]).cast<double>();
@@ -139,6 +146,20 @@ bool fit(const Stencil& stencil, std::array<double, kMostEntries>& result) {
   return std::abs(sum - 1.0) < 1e-6 && size <= kGreatestWeights;
 }
 
+// Least-squares weights by distance, and places in units of the farthest one's. Compact, close to the Gaussian
+// exp(-d^2 / 1.2 h^2): weights are small where the set of neighbours changes. False where all are in one place.
+bool weigh(Stencil& stencil, const std::array<double, kMostEntries>& distance_sq) {
+  const double farthest_sq = *std::max_element(distance_sq.begin(), distance_sq.end());
+  if (farthest_sq <= 0.0) return false;
+  const double inverse = 1.0 / std::sqrt(farthest_sq);
+  for (std::size_t m = 0; m < stencil.count; ++m) {
+    const double rest = 1.0 - distance_sq[m] / (1.2 * farthest_sq);
+    stencil.weight[m] = rest * rest * rest * rest;
+    stencil.place[m] *= inverse;
+  }
+  return true;
+}
+
 // Sets the weights of the parent's neighbours for one finer sample at p and returns the variance of all.
 double set_weights(const Vec3d& p, const CoarseLevel& level, std::uint32_t parent, float* weights) {
   const std::size_t entries = 1 + level.graph.k;
@@ -148,7 +169,6 @@ double set_weights(const Vec3d& p, const CoarseLevel& level, std::uint32_t paren
   Stencil stencil;
   std::array<std::size_t, kMostEntries> entry{};
   std::array<double, kMostEntries> distance_sq{};
-  double farthest_sq = 0.0;
   for (std::size_t e = 0; e < entries; ++e) {
     if (e > 0) weights[e - 1] = 0.0F;
     const std::uint32_t m = e == 0 ? parent : level.graph.index(parent, static_cast<std::uint32_t>(e - 1));
@@ -157,21 +177,11 @@ double set_weights(const Vec3d& p, const CoarseLevel& level, std::uint32_t paren
     entry[stencil.count] = e;
     distance_sq[stencil.count] = offset.squaredNorm();
     stencil.place[stencil.count] = {offset.dot(along), offset.dot(across)};
-    farthest_sq = std::max(farthest_sq, distance_sq[stencil.count]);
     ++stencil.count;
   }
-  const double size = std::sqrt(farthest_sq);
   std::array<double, kMostEntries> result{};
-  bool is_fitted = false;
-  if (size > 0.0) {
-    for (std::size_t m = 0; m < stencil.count; ++m) {
-      // Compact, close to the Gaussian exp(-d^2 / 1.2 h^2): it stays near where the set of neighbours changes.
-      const double rest = 1.0 - distance_sq[m] / (1.2 * farthest_sq);
-      stencil.weight[m] = rest * rest * rest * rest;
-      stencil.place[m] /= size;
-    }
-    is_fitted = fit<6>(stencil, result) || fit<3>(stencil, result) || fit<1>(stencil, result);
-  }
+  const bool is_fitted = weigh(stencil, distance_sq) &&
+                         (fit<6>(stencil, result) || fit<3>(stencil, result) || fit<1>(stencil, result));
   if (!is_fitted) return 0.0;  // the parent alone
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   double square = 0.0;
@@ -180,7 +190,51 @@ double set_weights(const Vec3d& p, const CoarseLevel& level, std::uint32_t paren
     mean += result[m] * stencil.place[m];
     square += result[m] * stencil.place[m].squaredNorm();
   }
-  return 0.5 * (square - mean.squaredNorm()) * farthest_sq;
+  return 0.5 * (square - mean.squaredNorm()) * *std::max_element(distance_sq.begin(), distance_sq.end());
+}
+
+// The fit's height at the origin of a stencil whose samples stand at these heights over its plane; 0 where
+// nothing can be fitted.
+double fitted_height(Stencil& stencil, const std::array<double, kMostEntries>& distance_sq,
+                     const std::array<double, kMostEntries>& height) {
+  std::array<double, kMostEntries> result{};
+  if (!weigh(stencil, distance_sq)) return 0.0;
+  if (!fit<6>(stencil, result) && !fit<3>(stencil, result) && !fit<1>(stencil, result)) return 0.0;
+  double sum = 0.0;
+  for (std::size_t m = 0; m < stencil.count; ++m) sum += result[m] * height[m];
+  return sum;
+}
+
+// Moves each coarse sample along its normal onto the surface of the finer ones: a mean of samples lies inside
+// a curved surface by half its curvature times their variance, and every level would shrink the shape by
+// that. The fit is over the child nearest to it and that child's neighbours.
+void settle(const Points& fine, const NeighborGraph& graph, CoarseLevel& level) {
+  parallel_for(level.position.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t m = begin; m < end; ++m) {
+      const Vec3f c = level.position[m];
+      std::uint32_t nearest = level.child[level.child_first[m]];
+      for (std::uint32_t at = level.child_first[m]; at < level.child_first[m + 1]; ++at) {
+        const std::uint32_t child = level.child[at];
+        if ((fine[child] - c).squaredNorm() < (fine[nearest] - c).squaredNorm()) nearest = child;
+      }
+      const Vec3d n = level.normal[m].cast<double>();
+      const Vec3d along = n.unitOrthogonal();
+      const Vec3d across = n.cross(along);
+      Stencil stencil;
+      std::array<double, kMostEntries> distance_sq{};
+      std::array<double, kMostEntries> height{};
+      for (std::uint32_t j = 0; j <= graph.k && stencil.count < kMostEntries; ++j) {
+        const std::uint32_t other = j == 0 ? nearest : graph.index(nearest, j - 1);
+        if (j > 0 && other == nearest) continue;  // the rest of a short row
+        const Vec3d offset = (fine[other] - c).cast<double>();
+        stencil.place[stencil.count] = {offset.dot(along), offset.dot(across)};
+        distance_sq[stencil.count] = offset.squaredNorm();
+        height[stencil.count] = offset.dot(n);
+        ++stencil.count;
+      }
+      level.position.set(m, c + (fitted_height(stencil, distance_sq, height) * n).cast<float>());
+    }
+  });
 }
 
 void set_up_weights(const Points& fine, CoarseLevel& level) {
@@ -284,10 +338,12 @@ Result<SmoothingHierarchy> build_smoothing_hierarchy(const Points& points, const
     level.position = std::move(set.position);
     level.normal = std::move(set.normal);
     level.parent = std::move(set.parent);
+    link_children(*position, level);
+    settle(*position, *neighbors, level);
+    set_offsets(*position, level);
     level.graph = same_side_graph(level.position, level.normal, context);
     if (is_cancelled()) return cancelled_error();
     level.listers = reverse_neighbors(level.graph);
-    link_children(*position, level);
     set_up_weights(*position, level);
     if (is_cancelled()) return cancelled_error();
     level.measure = measured(level.position, level.graph,

@@ -21,14 +21,14 @@ Sums umbrella_sums(const UmbrellaOperator& umbrella, const Float4* p, std::size_
   const std::uint32_t k = umbrella.graph->k;
   const std::size_t offset = i / kSimdBlock * k * kSimdBlock + i % kSimdBlock;
   const std::uint32_t* row = umbrella.graph->lanes.data() + offset;
-  Sums sum{};
-  Sums own;
-  for (std::size_t lane = 0; lane < kGroup; ++lane) own[lane] = p[i + lane];
+  const Float4* own = p + i;
+  Sums sums{};
+  Float4* sum = sums.data();
   if (umbrella.weights == nullptr) {
     for (std::uint32_t j = 0; j < k; ++j, row += kSimdBlock) {
       for (std::size_t lane = 0; lane < kGroup; ++lane) sum[lane] += p[row[lane]] - own[lane];
     }
-    return sum;
+    return sums;
   }
   const float* weight = umbrella.weights + offset;
   for (std::uint32_t j = 0; j < k; ++j, row += kSimdBlock, weight += kSimdBlock) {
@@ -36,7 +36,7 @@ Sums umbrella_sums(const UmbrellaOperator& umbrella, const Float4* p, std::size_
       sum[lane] += weight[lane] * (p[row[lane]] - own[lane]);
     }
   }
-  return sum;
+  return sums;
 }
 
 // Calls store(i, lambda umbrella(p)_i) for the samples [begin, end), whole groups of them.
@@ -96,7 +96,8 @@ void compensated_step(const UmbrellaOperator& umbrella, const ReverseNeighbors& 
     for (std::size_t i = begin; i < padded_to_block(end); i += kReverseLanes) {
       const std::uint32_t* row = rows + listers.slice_first[i / kReverseLanes] * kReverseLanes;
       const std::uint32_t* last = rows + listers.slice_first[i / kReverseLanes + 1] * kReverseLanes;
-      std::array<Float4, kReverseLanes> sum{};
+      std::array<Float4, kReverseLanes> sums{};
+      Float4* sum = sums.data();
       for (; row != last; row += kReverseLanes) {
         __builtin_prefetch(row + 64 * kReverseLanes);
         for (std::size_t lane = 0; lane < kReverseLanes; ++lane) sum[lane] += u[row[lane]];

@@ -1,4 +1,4 @@
-// Smoothing and decomposition: what a session is built of.
+// Decomposition: what a session is built of.
 #include <cstdlib>
 
 #include "engine/multires/base_surface.h"
@@ -6,7 +6,6 @@
 #include "engine/multires/hierarchy.h"
 #include "engine/normals/estimation.h"
 #include "engine/normals/orientation.h"
-#include "engine/smoothing/umbrella.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/synthetic_scan.h"
 
@@ -15,22 +14,17 @@ namespace {
 
 struct Size {
   std::size_t samples;
-  const char* smoothing;
   const char* decomposition;
 };
 
 void bench_kernels(BenchReport& report, const Size& size) {
-  if (!report.wants(size.decomposition) && !report.wants(size.smoothing)) return;
+  if (!report.wants(size.decomposition)) return;
   const auto n = static_cast<double>(size.samples);
   const Cloud scan = ordered_scan(size.samples);
   const NeighborGraph graph = build_neighbor_graph(scan.position, 10);
   Points normal;
   estimate_normals(scan.position, graph, {}, normal);
   orient_normals(scan.position, graph, normal);
-  report.time(size.smoothing, "ms", n, [&] {
-    const UmbrellaParams params{.preserve = VolumePreservation::kLocal, .iterations = 10};
-    if (!smooth(scan.position, normal, graph, params)) std::abort();
-  });
   const float diagonal = bounds_of(scan.position).diagonal();
   const ExecutionContext context;
   const std::vector<float> spacing = local_spacing(scan.position, graph);
@@ -43,8 +37,8 @@ void bench_kernels(BenchReport& report, const Size& size) {
 }  // namespace
 
 void bench_multires(BenchReport& report) {
-  bench_kernels(report, {150'000, "smooth.10iterations.150k", "decompose.150k"});
-  bench_kernels(report, {2'000'000, "smooth.10iterations.2m", "decompose.2m"});
+  bench_kernels(report, {150'000, "decompose.150k"});
+  bench_kernels(report, {2'000'000, "decompose.2m"});
 }
 
 }  // namespace pointwright::bench

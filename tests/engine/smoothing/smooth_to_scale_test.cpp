@@ -96,6 +96,40 @@ TEST_CASE("free steps on a random sampling approach the Gaussian of a short wave
   CHECK(error[2] < 0.7 * error[1]);
 }
 
+TEST_CASE("the kernel variance predicts a wave's attenuation on a gradient of density") {
+  // Three times as dense at the right edge as at the left; the formula for even samplings, 4 pi s^2 / (lambda
+  // (k + 1) h^2) iterations, is off by that factor between the edges.
+  constexpr double kWidth = 100.0;
+  constexpr double kScale = 4.0;
+  test::Random random(11);
+  for (const double wavelength : {15.0, 24.0}) {
+    for (const SmoothingDirection direction : {SmoothingDirection::kFree, SmoothingDirection::kAlongNormal}) {
+      Surface surface{.position = Points(10'000), .normal = Points(10'000)};
+      for (std::size_t i = 0; i < surface.size(); ++i) {
+        // Density 1 + 2 u over u in [0, 1]: u^2 + u = 2 r.
+        const double u = -0.5 + std::sqrt(0.25 + 2.0 * random.uniform());
+        const double x = kWidth * (u - 0.5);
+        const double height = 0.01 * wavelength;
+        const double slope = kTau / wavelength * height * std::cos(kTau * x / wavelength);
+        surface.position.set(
+            i, Vec3d(x, random.uniform(-0.5, 0.5) * kWidth, height * std::sin(kTau * x / wavelength))
+                   .cast<float>());
+        surface.normal.set(i, Vec3d(-slope, 0.0, 1.0).normalized().cast<float>());
+      }
+      surface = coherent(surface);
+      const auto result =
+          smooth_to_scale(surface.position, surface.normal, build_neighbor_graph(surface.position, 10),
+                          kScale, direction, kPlenty);
+      REQUIRE(result.ok());
+      const double left =
+          amplitude(result.value().points, wavelength, kWidth / 2, 4.0 * kScale) / (0.01 * wavelength);
+      MESSAGE("wavelength " << wavelength << ": " << left << ", effective scale "
+                            << effective_scale(left, wavelength) / kScale);
+      CHECK(relative_error(effective_scale(left, wavelength), kScale) < 0.1);
+    }
+  }
+}
+
 TEST_CASE("a scale means the same at two densities") {
   const Run coarse = attenuate(Sampling::kRandom, 1.0, 20.0, 4.0, SmoothingDirection::kAlongNormal);
   const Run fine = attenuate(Sampling::kRandom, 0.7, 20.0, 4.0, SmoothingDirection::kAlongNormal);
