@@ -36,12 +36,21 @@ enum class ContractionOrder {
   kBatched,  ///< rounds of independent pairs, each the best of both its samples; parallel
 };
 
+enum class Placement {
+  kQuadricMinimum,  ///< as in §3.2: where the error is least, which on curved surfaces is outside of them
+  /// Halfway from there, along the normal, to the mean of what the sample stands for, which is as far inside:
+  /// on the surface to third order, nearer in both directions. Creases and corners keep the minimum.
+  kOnSurface,
+};
+
 struct SimplifyParams {
   SimplifyTarget target = KeepRatio{0.5};
   ContractionOrder order = ContractionOrder::kBatched;
   /// Adds this times the squared distance of the pair to its cost, in [0, 10]. 0: pure quadrics, as in §3.2,
-  /// few samples on flats. 0.05 keeps the result even, as smoothing on it wants.
-  float length_weight = 0.0F;
+  /// few samples on flats, where chance decides. 1e-5 spreads those evenly and changes nothing elsewhere;
+  /// 0.05 keeps the whole result even, as smoothing on it wants.
+  float length_weight = 1e-5F;
+  Placement placement = Placement::kOnSurface;
   /// Never contracts a pair with n_i . n_j < 0, which stand on two sheets of a thin part. Wants consistently
   /// oriented normals; with false their sides do not count.
   bool separate_sheets = true;
@@ -62,35 +71,54 @@ struct Contraction {
 /// What re-inserting needs, in the order of contraction.
 struct ContractionRecord {
   std::vector<Contraction> steps;
-  Points position;  ///< of the survivor after each step
+  Points position;  ///< of the survivor after each step, where the quadric is least
   Points normal;
   /// The neighbourhood that the survivor inherited from both, bounded: compressed rows of input indices.
-  std::vector<std::uint32_t> neighbor_first;  ///< steps + 1
+  std::vector<std::uint64_t> neighbor_first;  ///< steps + 1
   std::vector<std::uint32_t> neighbor;
 };
 
 struct Simplification {
   std::vector<std::uint32_t> kept;    ///< M survivors: indices into the input, ascending
-  Points position;                    ///< M: where the survivors stand now
+  Points position;                    ///< M: where the survivors stand; untouched ones keep their bits
   Points normal;                      ///< M unit normals: the means over what they stand for
   std::vector<std::uint32_t> parent;  ///< N: of every input sample, its survivor as an index into `kept`
   ContractionRecord record;
+  Placement placement = Placement::kOnSurface;
 };
 
 /// Paper:       §3.2. Q_p, the quadric of a sample: the mean squared distance to the planes through p that
-///              are spanned by e_i = p - p_i and b_i = e_i x n, one for each neighbour p_i. Contracting
-///              adds quadrics and merges neighbourhoods; the new sample stands where the sum is least
-/// Shapes:      N samples in coherent order, N unit normals, their graph
-/// Errors:      kInvalidArgument, kCancelled
+///              are spanned by e_i = p - p_i and b_i = e_i x n, one for each neighbour p_i. Contracting adds
+///              quadrics and merges neighbourhoods; the new sample stands where the sum is least. Where it
+///              does not say (flats, along creases) the pair's weighted mean does
+/// Shapes:      N samples in coherent order, N unit normals, their graph. More than the target are kept only
+///              where the rest are opposed sheets; far parts are joined when their own samples are used up
+/// Errors:      kInvalidArgument, kTooLarge (2^27 samples), kCancelled
+/// Cost:        kGreedy O(N k log N), one thread; kBatched O(N k), parallel; about 500 bytes a sample while
+///              it runs
 /// Determinism: bitwise equal for any thread count and instruction set
 /// Cancels:     between rounds and between blocks of samples
 Result<Simplification> simplify(const Points& position, const Points& normal, const NeighborGraph& graph,
                                 const SimplifyParams& params, const ExecutionContext* context = nullptr);
 
 /// Undoes contractions, the last one first, until `count` samples are there (§3.3, the inverse of Psi).
-/// Samples come back bit by bit as they were.
+/// Samples come back bit by bit as they were; the record ends with the contractions that are still done.
 /// Pre:  position and normal are those that `simplified` was made of; M <= count <= N
+/// Cost: O(N)
 Simplification reinsert(const Simplification& simplified, const Points& position, const Points& normal,
                         std::size_t count);
+
+/// Neighbours of every sample that is left, ascending: row m is neighbor[first[m]] .. neighbor[first[m + 1]].
+struct Neighborhoods {
+  std::vector<std::size_t> first;
+  std::vector<std::uint32_t> neighbor;  ///< indices into `kept`
+  friend bool operator==(const Neighborhoods&, const Neighborhoods&) = default;
+};
+
+/// The neighbourhoods that contraction has led to, made symmetric: samples are neighbours where either has
+/// inherited the other. They follow from which contractions are done alone, so re-insertion restores them.
+/// Pre:  graph is the one that `simplified` was made with
+/// Cost: O(N + M k log k)
+Neighborhoods neighborhoods(const Simplification& simplified, const NeighborGraph& graph);
 
 }  // namespace pointwright

@@ -1,0 +1,116 @@
+#pragma once
+// What the two orders of contraction share (internal to simplification.cpp, greedy.cpp and batched.cpp).
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/core/execution_context.h"
+#include "engine/core/points.h"
+#include "engine/simplification/contraction_kernels.h"
+#include "engine/simplification/simplification.h"
+#include "engine/spatial/neighbor_graph.h"
+
+namespace pointwright {
+
+/// A node of contraction_kernels.h, a cache line of its own.
+struct alignas(64) ContractionNode {
+  float fields[kNodeFloats];
+};
+
+/// Neighbours that a sample brings along at most; a contracted one keeps kRowNeighbors.
+inline constexpr std::uint32_t kStartNeighbors = 12;
+
+struct ContractionPair {
+  std::uint32_t first = 0;  ///< first < second
+  std::uint32_t second = 0;
+  float cost = 0.0F;
+};
+
+/// When to stop, and what a pair may cost; lengths in the nodes' scale.
+struct ContractionGoal {
+  std::size_t count = 1;                                 ///< samples to be left
+  float limit = std::numeric_limits<float>::infinity();  ///< of the quadric part
+  float length_weight = 0.0F;
+  bool separate_sheets = true;
+};
+
+/// The contractions as they were made. Both orders fill it; finish_simplification() brings it in order of
+/// cost.
+struct ContractionLog {
+  struct State {
+    float position[3];
+    float normal[3];
+  };
+  struct Row {
+    std::uint32_t chunk = 0;
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+  };
+  std::vector<Contraction> steps;  ///< errors in the nodes' scale
+  std::vector<float> cost;         ///< of each step, never less than those of the steps that it builds on
+  std::vector<State> state;        ///< of the survivor
+  std::vector<Row> row;            ///< the survivor's neighbours, in one of the chunks
+  std::vector<std::vector<std::uint32_t>> chunks;
+};
+
+/// The nodes of the samples, and one buffer's worth of kernel calls over them. The scale is a power of two
+/// that brings the cloud's extent near 1, so that squares of squares neither vanish nor overflow.
+class ContractionNodes {
+ public:
+  ContractionNodes(const Points& position, const Points& normal, const NeighborGraph& graph,
+                   const ExecutionContext* context);
+
+  [[nodiscard]] float scale() const { return scale_; }
+  [[nodiscard]] std::size_t count() const { return count_; }
+  [[nodiscard]] const ContractionNode& operator[](std::size_t i) const { return nodes_[i]; }
+  void set(std::size_t i, const ContractionNode& node) { nodes_[i] = node; }
+  /// Leaves the nodes source[0], source[1], ... (ascending), which get the numbers 0, 1, ...
+  void compact(const std::vector<std::uint32_t>& source);
+
+  /// Costs of the pairs (first[i], second[i]). The columns have room for whole blocks, the pairs' with valid
+  /// indices.
+  void costs(const ContractionGoal& goal, const std::uint32_t* first, const std::uint32_t* second,
+             std::size_t count, float* cost) const;
+  /// The contracted nodes, which are not stored yet.
+  void contract(std::span<const ContractionPair> pairs, std::vector<ContractionNode>& merged) const;
+
+ private:
+  std::unique_ptr<ContractionNode[]> nodes_;
+  std::unique_ptr<ContractionNode[]> spare_;  // where compact() writes
+  std::size_t count_ = 0;
+  float scale_ = 1.0F;
+};
+
+/// Sample i's first neighbours, and the sample before it where that stands at the same place: no list of the
+/// graph contains those. Returns how many were written to `row`.
+std::uint32_t starting_row(const Points& position, const NeighborGraph& graph, std::size_t i,
+                           std::span<std::uint32_t, kRowNeighbors> row);
+
+/// The samples that are left and their nearest neighbours, for when rows have run out of partners: far parts
+/// of a cloud share no neighbour.
+struct SurvivorGraph {
+  Points position;  ///< of all nodes
+  NeighborGraph graph;
+};
+SurvivorGraph survivor_graph(const ContractionNodes& nodes, const ExecutionContext* context);
+
+/// A bijection of 64 bits (the finaliser of SplitMix64): orders pairs of equal cost as if at random, so that
+/// on exact flats many of them are the first of both their samples.
+inline std::uint64_t tie_key(std::uint32_t first, std::uint32_t second) {
+  std::uint64_t z = (static_cast<std::uint64_t>(first) << 32U) | second;
+  z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27U)) * 0x94d049bb133111ebULL;
+  return z ^ (z >> 31U);
+}
+
+/// Both return false where they were cancelled.
+bool contract_greedily(const Points& position, const NeighborGraph& graph, const ContractionGoal& goal,
+                       ContractionNodes& nodes, ContractionLog& log, const ExecutionContext* context);
+bool contract_in_batches(const Points& position, const NeighborGraph& graph, const ContractionGoal& goal,
+                         ContractionNodes& nodes, ContractionLog& log, const ExecutionContext* context);
+
+}  // namespace pointwright

@@ -1,0 +1,246 @@
+// Garland and Heckbert, "Surface simplification using quadric error metrics", 1997, on neighbourhoods instead
+// of a mesh (§3.2).
+#include "engine/simplification/simplification.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "engine/core/parallel.h"
+#include "engine/simplification/contraction.h"
+
+namespace pointwright {
+namespace {
+
+constexpr std::size_t kMaxSamples = (std::size_t{1} << 27U) - 1;  // node offsets are 31 bits
+constexpr float kMaxLengthWeight = 10.0F;
+
+// The log in order of cost, its first `count` contractions; lengths back in model units.
+ContractionRecord ordered_record(const ContractionLog& log, std::size_t count, float scale) {
+  std::vector<std::uint64_t> keys(log.steps.size());
+  std::vector<std::uint32_t> order(log.steps.size());
+  std::iota(order.begin(), order.end(), 0U);
+  // Costs are not negative, so their bits order them; the sort is stable and no step costs less than those
+  // that it builds on, which were made before it.
+  for (std::size_t s = 0; s < keys.size(); ++s) keys[s] = std::bit_cast<std::uint32_t>(log.cost[s]);
+  sort_by_key(keys, order);
+  order.resize(count);
+  ContractionRecord record;
+  record.steps.resize(count);
+  record.position.resize(count);
+  record.normal.resize(count);
+  record.neighbor_first.assign(count + 1, 0);
+  for (std::size_t s = 0; s < count; ++s) {
+    record.neighbor_first[s + 1] = record.neighbor_first[s] + log.row[order[s]].count;
+  }
+  record.neighbor.resize(record.neighbor_first[count]);
+  const float inverse = 1.0F / scale;
+  parallel_for(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      const auto& [p, n] = log.state[order[s]];
+      record.steps[s] = log.steps[order[s]];
+      record.steps[s].error *= inverse;
+      record.position.set(s, {p[0] * inverse, p[1] * inverse, p[2] * inverse});
+      record.normal.set(s, {n[0], n[1], n[2]});
+      const auto& [chunk, first, neighbors] = log.row[order[s]];
+      const auto from = log.chunks[chunk].begin() + first;
+      std::copy(from, from + neighbors,
+                record.neighbor.begin() + static_cast<std::ptrdiff_t>(record.neighbor_first[s]));
+    }
+  });
+  return record;
+}
+
+// Normals of what a sample stands for, as 1 - |mean|^2: from here on it is a crease and stays where it is.
+constexpr double kCrease = 0.3;
+
+// Placement::kOnSurface. On z = x' C x / 2 the tangent planes of a patch around 0 meet 0's normal at -E/2 on
+// average and its samples lie E/2 above, E the mean of x' C x.
+void settle(const Points& position, const Points& normal, Simplification& result) {
+  struct Sum {
+    Vec3d position = Vec3d::Zero();
+    Vec3d normal = Vec3d::Zero();
+    double count = 0.0;
+  };
+  std::vector<Sum> sums(result.kept.size());
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    Sum& sum = sums[result.parent[i]];
+    sum.position += position[i].cast<double>();
+    const double side = normal[i].dot(result.normal[result.parent[i]]) < 0.0F ? -1.0 : 1.0;
+    sum.normal += side * normal[i].cast<double>();
+    sum.count += 1.0;
+  }
+  parallel_for(sums.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t m = begin; m < end; ++m) {
+      const Sum& sum = sums[m];
+      if (sum.count < 2.0) continue;
+      const double spread = 1.0 - (sum.normal / sum.count).squaredNorm();
+      const double share = 0.5 * std::max(0.0, 1.0 - spread / kCrease);
+      const Vec3d p = result.position[m].cast<double>();
+      const Vec3d n = result.normal[m].cast<double>();
+      result.position.set(m, (p + share * n.dot(sum.position / sum.count - p) * n).cast<float>());
+    }
+  });
+}
+
+// Every column of the result but the record, which has all the contractions to be done.
+void apply_record(const Points& position, const Points& normal, Simplification& result) {
+  const std::size_t n = position.size();
+  const ContractionRecord& record = result.record;
+  constexpr std::uint32_t kNone = 0xffffffffU;
+  std::vector<std::uint32_t> last_step(n, kNone);
+  std::vector<std::uint32_t> survivor(n);
+  std::iota(survivor.begin(), survivor.end(), 0U);
+  for (std::size_t s = 0; s < record.steps.size(); ++s) {
+    last_step[record.steps[s].survivor] = static_cast<std::uint32_t>(s);
+    survivor[record.steps[s].removed] = record.steps[s].survivor;
+  }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    if (survivor[i] == i) result.kept.push_back(i);
+  }
+  result.position.resize(result.kept.size());
+  result.normal.resize(result.kept.size());
+  result.parent.resize(n);
+  for (std::uint32_t m = 0; m < result.kept.size(); ++m) {
+    const std::uint32_t i = result.kept[m];
+    const std::uint32_t s = last_step[i];
+    result.position.set(m, s == kNone ? position[i] : record.position[s]);
+    result.normal.set(m, s == kNone ? normal[i] : record.normal[s]);
+    result.parent[i] = m;
+  }
+  for (std::size_t s = record.steps.size(); s-- > 0;) {
+    result.parent[record.steps[s].removed] = result.parent[record.steps[s].survivor];
+  }
+  if (result.placement == Placement::kOnSurface && !record.steps.empty()) settle(position, normal, result);
+}
+
+Error invalid(const char* message, const char* field, double limit, double actual) {
+  return {.code = ErrorCode::kInvalidArgument,
+          .message = message,
+          .field = field,
+          .limit = limit,
+          .actual = actual};
+}
+
+}  // namespace
+
+Result<void> validate(const SimplifyParams& params) {
+  if (const auto* keep = std::get_if<KeepCount>(&params.target); keep != nullptr && keep->count < 1) {
+    return invalid("at least one sample must be kept", "target.count", 1, 0);
+  }
+  if (const auto* keep = std::get_if<KeepRatio>(&params.target);
+      keep != nullptr && !(keep->ratio > 0.0 && keep->ratio <= 1.0)) {
+    return invalid("the ratio must lie in (0, 1]", "target.ratio", 1, keep->ratio);
+  }
+  if (const auto* keep = std::get_if<KeepWithin>(&params.target);
+      keep != nullptr && !(keep->error >= 0.0F && std::isfinite(keep->error))) {
+    return invalid("the error must be finite and not negative", "target.error", 0,
+                   static_cast<double>(keep->error));
+  }
+  if (!(params.length_weight >= 0.0F && params.length_weight <= kMaxLengthWeight)) {
+    return invalid("length_weight must lie between 0 and 10", "length_weight",
+                   static_cast<double>(kMaxLengthWeight), static_cast<double>(params.length_weight));
+  }
+  return {};
+}
+
+Result<Simplification> simplify(const Points& position, const Points& normal, const NeighborGraph& graph,
+                                const SimplifyParams& params, const ExecutionContext* context) {
+  if (const auto valid = validate(params); !valid) return valid.error();
+  const std::size_t n = position.size();
+  POINTWRIGHT_CHECK(graph.count == n && normal.size() == n, "normals and graph must be of these points");
+  if (n > kMaxSamples) {
+    return Error{.code = ErrorCode::kTooLarge,
+                 .message = "too many samples to simplify at once",
+                 .field = "position",
+                 .limit = static_cast<double>(kMaxSamples),
+                 .actual = static_cast<double>(n)};
+  }
+  Simplification result{.placement = params.placement};
+  result.record.neighbor_first.assign(1, 0);
+  if (n == 0) return result;
+  ContractionNodes nodes(position, normal, graph, context);
+  ContractionGoal goal{.length_weight = params.length_weight, .separate_sheets = params.separate_sheets};
+  if (const auto* count = std::get_if<KeepCount>(&params.target)) goal.count = std::min(n, count->count);
+  if (const auto* keep = std::get_if<KeepRatio>(&params.target)) {
+    goal.count = std::max<std::size_t>(
+        1, static_cast<std::size_t>(std::llround(keep->ratio * static_cast<double>(n))));
+  }
+  if (const auto* within = std::get_if<KeepWithin>(&params.target)) {
+    const float error = within->error * nodes.scale();
+    goal.limit = error * error;
+  }
+  if (goal.count < n) {
+    ContractionLog log;
+    const auto contract = params.order == ContractionOrder::kGreedy ? contract_greedily : contract_in_batches;
+    if (!contract(position, graph, goal, nodes, log, context)) return cancelled_error();
+    result.record = ordered_record(log, std::min(log.steps.size(), n - goal.count), nodes.scale());
+  }
+  apply_record(position, normal, result);
+  return result;
+}
+
+Simplification reinsert(const Simplification& simplified, const Points& position, const Points& normal,
+                        std::size_t count) {
+  const std::size_t n = position.size();
+  POINTWRIGHT_CHECK(simplified.parent.size() == n && normal.size() == n,
+                    "these are not the simplified points");
+  POINTWRIGHT_CHECK(count >= simplified.kept.size() && count <= n, "only what was removed can come back");
+  Simplification result{.placement = simplified.placement};
+  const ContractionRecord& record = simplified.record;
+  const std::size_t steps = n - count;
+  const auto first_of = [](const auto& column, std::size_t length) {
+    return std::vector(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(length));
+  };
+  result.record.steps = first_of(record.steps, steps);
+  result.record.position.resize(steps);
+  result.record.normal.resize(steps);
+  for (std::size_t s = 0; s < steps; ++s) {
+    result.record.position.set(s, record.position[s]);
+    result.record.normal.set(s, record.normal[s]);
+  }
+  result.record.neighbor_first = first_of(record.neighbor_first, steps + 1);
+  result.record.neighbor = first_of(record.neighbor, record.neighbor_first[steps]);
+  apply_record(position, normal, result);
+  return result;
+}
+
+Neighborhoods neighborhoods(const Simplification& simplified, const NeighborGraph& graph) {
+  const ContractionRecord& record = simplified.record;
+  POINTWRIGHT_CHECK(graph.count == simplified.parent.size(),
+                    "the graph is not that of the simplified points");
+  constexpr std::uint32_t kNone = 0xffffffffU;
+  std::vector<std::uint32_t> last_step(graph.count, kNone);
+  for (std::size_t s = 0; s < record.steps.size(); ++s) {
+    last_step[record.steps[s].survivor] = static_cast<std::uint32_t>(s);
+  }
+  std::vector<std::vector<std::uint32_t>> rows(simplified.kept.size());
+  for (std::uint32_t m = 0; m < rows.size(); ++m) {
+    const std::uint32_t i = simplified.kept[m];
+    const auto join = [&](std::uint32_t other) {
+      const std::uint32_t x = simplified.parent[other];
+      if (x == m) return;
+      rows[m].push_back(x);
+      rows[x].push_back(m);
+    };
+    if (const std::uint32_t s = last_step[i]; s != kNone) {
+      std::for_each(record.neighbor.begin() + static_cast<std::ptrdiff_t>(record.neighbor_first[s]),
+                    record.neighbor.begin() + static_cast<std::ptrdiff_t>(record.neighbor_first[s + 1]),
+                    join);
+    } else {
+      for (std::uint32_t j = 0; j < std::min(graph.k, kStartNeighbors); ++j) join(graph.index(i, j));
+    }
+  }
+  Neighborhoods result;
+  result.first.assign(1, 0);
+  for (std::vector<std::uint32_t>& row : rows) {
+    std::sort(row.begin(), row.end());
+    result.neighbor.insert(result.neighbor.end(), row.begin(), std::unique(row.begin(), row.end()));
+    result.first.push_back(result.neighbor.size());
+  }
+  return result;
+}
+
+}  // namespace pointwright
