@@ -213,8 +213,7 @@ Parsed<CreateSessionRequest> parse_create_session(const Json& document) {
     }
   }
   if (const Json* const scales = object.optional("scales")) {
-    constexpr std::size_t kMaxScales = 8;
-    if (const Json* const array = read_array(*scales, "/scales", errors, 1, kMaxScales)) {
+    if (const Json* const array = read_array(*scales, "/scales", errors, 1, kMaxBands)) {
       request.params.scales.clear();
       for (std::size_t i = 0; i < array->size(); ++i) {
         const auto scale =

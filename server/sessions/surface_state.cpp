@@ -12,6 +12,22 @@ namespace {
 /// The fractions of a diagonal that builders take as scales.
 constexpr float kLeastScale = 1e-4F;
 constexpr float kGreatestScale = 0.2F;
+/// A little below the greatest ratio of neighbouring scales that builders take.
+constexpr float kScaleRatio = 0.94F;
+
+/// Moves scales that no builder takes to the nearest ones that it does, apart enough.
+void fit_scales(std::vector<float>& scales) {
+  float least = kLeastScale;
+  for (std::size_t level = scales.size(); level-- > 0;) {
+    scales[level] = std::max(scales[level], least);
+    least = scales[level] / kScaleRatio;
+  }
+  float greatest = kGreatestScale;
+  for (float& scale : scales) {
+    scale = std::min(scale, greatest);
+    greatest = kScaleRatio * scale;
+  }
+}
 
 }  // namespace
 
@@ -34,9 +50,10 @@ Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState&
   // box leaves no such fraction, the nearest one that a builder takes. The reports say what was reached.
   HierarchyParams params = rest.params;
   const float diagonal = bounds_of(current.position).diagonal();
-  if (diagonal > 0.0F)
-    for (float& scale : params.scales)
-      scale = std::clamp(scale * (rest.diagonal / diagonal), kLeastScale, kGreatestScale);
+  if (diagonal > 0.0F) {
+    for (float& scale : params.scales) scale *= rest.diagonal / diagonal;
+    if (!validate(params)) fit_scales(params.scales);
+  }
   auto built = rest.build(current, params, context);
   if (!built) return built.error();
   auto surface = std::make_shared<MultiresSurface>(std::move(built.value().surface));

@@ -11,11 +11,18 @@ using protocol::ProblemKind;
 
 namespace {
 
-/// Bytes a sample of a session: the hierarchy while it is built, then the rest, the committed, the previewed
-/// and the shown surface with their fields and frames.
+/// Bytes a sample of a session with one band: the hierarchy while it is built, then the rest, the committed,
+/// the previewed and the shown surface with their fields and frames.
 constexpr std::uint64_t kBytesPerSample = 400;
-/// Stored history states that a session may need at most before it thins them out, in bytes a sample.
-constexpr std::uint64_t kHistoryBytesPerSample = 32 * 52;
+/// What another band adds to a surface: positions, normals and the detail coefficient.
+constexpr std::uint64_t kBytesPerBand = 28;
+/// Surfaces of a session that are not in its history: the committed, the previewed, the shown, and one that is
+/// being made.
+constexpr std::uint64_t kLiveSurfaces = 4;
+/// Stored history states that a session may need at most before it thins them out, and the bytes a sample of
+/// one with one band.
+constexpr std::uint64_t kHistoryStates = 32;
+constexpr std::uint64_t kStateBytesPerSample = 52;
 
 }  // namespace
 
@@ -36,19 +43,22 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
                    .detail = "there is no cloud with that id",
                    .errors = {{.pointer = "/cloud", .detail = "no such cloud"}}};
   const std::uint64_t samples = cloud->cloud->size();
-  const std::uint64_t history = std::min(limits_.history_bytes, samples * kHistoryBytesPerSample);
+  const std::uint64_t more_bands = (request.params.scales.size() - 1) * kBytesPerBand;
+  const std::uint64_t live = samples * (kBytesPerSample + kLiveSurfaces * more_bands);
+  const std::uint64_t history =
+      std::min(limits_.history_bytes, samples * kHistoryStates * (kStateBytesPerSample + more_bands));
   const std::lock_guard lock(mutex_);
   if (entries_.size() >= limits_.max_sessions)
     return Problem{.kind = ProblemKind::kTooMany,
                    .detail = "the server holds as many sessions as it may",
                    .limit = static_cast<double>(limits_.max_sessions),
                    .actual = static_cast<double>(entries_.size())};
-  entry.memory = memory_.hold(samples * kBytesPerSample + history);
+  entry.memory = memory_.hold(live + history);
   if (entry.memory == nullptr)
     return Problem{.kind = ProblemKind::kOutOfSpace,
                    .detail = "the memory for sessions is used up",
                    .limit = static_cast<double>(memory_.total()),
-                   .actual = static_cast<double>(memory_.held() + samples * kBytesPerSample + history)};
+                   .actual = static_cast<double>(memory_.held() + live + history)};
   entry.session =
       Session::create({.id = random_id(),
                        .name = request.name.empty() ? cloud->document.name : request.name,

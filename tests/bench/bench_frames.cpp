@@ -1,4 +1,4 @@
-// A frame of a drag: deform, rebuild, encode.
+// A frame of a drag in three bands: deform, rebuild, encode.
 #include <algorithm>
 #include <cstdlib>
 #include <numbers>
@@ -27,11 +27,11 @@ Marks painted_sides(const Points& position) {
 }
 
 void bench_drag(BenchReport& report, const std::string& label, std::size_t n) {
-  const std::string frame = "frame." + label + ".1band";
+  const std::string frame = "frame." + label;
   const std::string encode = "frame.encode." + label;
   if (!report.wants(frame) && !report.wants(encode)) return;
   const Cloud scan = ordered_scan(n);
-  auto built = build_hierarchy(scan, HierarchyParams{}, ExecutionContext{});
+  auto built = build_hierarchy(scan, HierarchyParams{.scales = kThreeScales}, ExecutionContext{});
   if (!built) std::abort();
   const Hierarchy& hierarchy = built.value();
   const Points& base = hierarchy.surface.levels[0].position;

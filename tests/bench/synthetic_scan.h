@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "engine/core/cloud.h"
 
@@ -14,6 +15,9 @@ namespace pointwright::bench {
 /// Pre:  n <= 2^32 - 1
 /// Cost: O(N)
 Cloud synthetic_scan(std::size_t n, std::uint64_t seed = 1);
+
+/// Scales of the three bands that sessions and frames are measured with.
+inline const std::vector<float> kThreeScales{0.04F, 0.02F, 0.01F};
 
 /// The scan as an importer leaves it: in coherent order.
 Cloud ordered_scan(std::size_t n);

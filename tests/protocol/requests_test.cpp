@@ -170,7 +170,9 @@ TEST_CASE("a session names its cloud; the rest has defaults") {
   CHECK(refused(cloud + R"(,"neighbors":9.5})", parse_create_session) == Pointers{"/neighbors"});
   CHECK(refused(cloud + R"(,"preview":true})", parse_create_session) == Pointers{"/preview"});
   CHECK(refused(cloud + R"(,"scales":[0.3]})", parse_create_session).size() == 1);
-  CHECK(refused(cloud + R"(,"scales":[0.05,0.02]})", parse_create_session).size() == 1);
+  CHECK(refused(cloud + R"(,"scales":[0.02,0.05]})", parse_create_session).size() == 1);
+  CHECK(refused(cloud + R"(,"scales":[0.2,0.15,0.1,0.08,0.06,0.04,0.03,0.02,0.01]})", parse_create_session) ==
+        Pointers{"/scales"});
 }
 
 TEST_CASE("what was read is written back and read again to the bit") {

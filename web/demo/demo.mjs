@@ -148,14 +148,14 @@ async function tell(url) {
   });
   const session = await step("split shape and detail", async () => {
     const response = await call(url, "POST", "/v1/sessions", {
-      json: { cloud: cloud.id, name: "Demo", scales: [0.02] },
+      json: { cloud: cloud.id, name: "Demo", scales: [0.02, 0.01, 0.005] },
     });
     const path = response.headers.get("location");
     demand(response.status === 202 && path, "POST /v1/sessions did not answer 202 with a Location");
     const document = await waitUntilReady(url, path);
-    const band = document.decomposition[0];
+    const share = (band) => `${((100 * band.max_detail) / document.diagonal).toFixed(2)} %`;
     return [
-      `details up to ${((100 * band.max_detail) / document.diagonal).toFixed(2)} % of the diagonal`,
+      `${document.decomposition.length} bands, details up to ${document.decomposition.map(share).join(", ")} of the diagonal`,
       { path, ...document },
     ];
   });

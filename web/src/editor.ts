@@ -114,7 +114,7 @@ export function createEditor(
     { capture: true, passive: false },
   );
 
-  const transformPanel = createTransformPanel(bus, transform);
+  const transformPanel = createTransformPanel(bus, document, transform);
   const shortcuts = editorShortcuts({ bus, viewport, editor: transform, transformPanel, stepBrush });
   const sheet = createShortcutSheet(shortcuts);
   bus.function("shortcuts.show", () => sheet.show());

@@ -23,7 +23,8 @@ export interface TransformState {
   axis: "x" | "y" | "z" | null;
   pivotEditing: boolean;
   /** The smooth base moves and carries its detail; else the samples themselves move. */
-  carryDetail: boolean;
+  /** The level that moves; finer ones ride along. */
+  level: number;
   /** Why no transform can be made now; null where it can. */
   obstacle: string | null;
 }

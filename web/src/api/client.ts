@@ -85,10 +85,10 @@ export class ApiClient {
     return this.json(`v1/sessions/${id}`);
   }
 
-  createSession(cloud: string, options: { name?: string; scale?: number } = {}): Promise<SessionDocument> {
+  createSession(cloud: string, options: { name?: string; scales?: number[] } = {}): Promise<SessionDocument> {
     const body: Record<string, unknown> = { cloud };
     if (options.name !== undefined) body["name"] = options.name;
-    if (options.scale !== undefined) body["scales"] = [options.scale];
+    if (options.scales !== undefined) body["scales"] = options.scales;
     return this.send("POST", "v1/sessions", body);
   }
 

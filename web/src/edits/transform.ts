@@ -30,7 +30,7 @@ export class TransformEditor {
   private pivot_: Vec3 = [0, 0, 0];
   private axis_: TransformState["axis"] = null;
   private pivotEditing_ = false;
-  private carryDetail_ = true;
+  private level_ = 0;
   private committing_: number | null = null;
 
   constructor(
@@ -76,7 +76,7 @@ export class TransformEditor {
       pivot: this.pivot_,
       axis: this.axis_,
       pivotEditing: this.pivotEditing_,
-      carryDetail: this.carryDetail_,
+      level: this.level_,
       obstacle: obstacleOf(this.store_.document),
     };
   }
@@ -114,9 +114,9 @@ export class TransformEditor {
     this.tell();
   }
 
-  /** Whether the smooth base moves and its detail rides along, or the samples themselves move. */
-  setCarryDetail(carry: boolean): void {
-    this.carryDetail_ = carry;
+  /** Which level moves: the detail of the finer ones rides along; on the finest one the samples themselves move. */
+  setLevel(level: number): void {
+    this.level_ = level;
     if (this.deformation_) this.preview.want(this.deformation_);
     this.tell();
   }
@@ -168,8 +168,7 @@ export class TransformEditor {
   }
 
   private body(deformation: Deformation): EditBody {
-    const levels = this.store_.document.levels.map(({ level }) => level);
-    return { level: this.carryDetail_ ? Math.min(...levels) : Math.max(...levels), deformation };
+    return { level: this.level_, deformation };
   }
 
   private tell(): void {

@@ -475,8 +475,9 @@ export interface components {
             cloud: components["schemas"]["Id"];
             name?: components["schemas"]["Name"];
             /**
-             * @description Smoothing scale of each base level, coarsest first, as a fraction of the bounding box's diagonal. One in this
-             *     version.
+             * @description Smoothing scale of each base level, coarsest first, as a fraction of the bounding box's diagonal: the standard
+             *     deviation of the Gaussian that all the smoothing down to that level equals. Each is at most 0.95 of the one
+             *     before.
              * @default [
              *       0.02
              *     ]

@@ -1,19 +1,17 @@
 import type { CloudDocument, SessionSummary } from "../api/types";
+import { DEFAULT_SCALES, parseScales, scalesText } from "../edits/scales";
 import { sessionUrl } from "../link";
-import { h } from "./dom";
-import { numberField } from "./fields";
+import { h, setText } from "./dom";
+import { textField } from "./fields";
 import { formatAge, formatBytes, formatCount } from "./format";
 import { icon } from "./icons";
-
-const DEFAULT_SCALE_PERCENT = 2;
-const MAX_SCALE_PERCENT = 20;
 
 export interface CloudCardOptions {
   cloud: CloudDocument;
   /** Newest first. */
   sessions: readonly SessionSummary[];
-  /** Starts a session whose base is smoothed at a part of the diagonal. */
-  start: (scale: number) => Promise<void>;
+  /** Starts a session whose base levels are smoothed at these parts of the diagonal, the coarsest first. */
+  start: (scales: number[]) => Promise<void>;
   removeCloud: () => Promise<void>;
   removeSession: (id: string) => Promise<void>;
 }
@@ -61,7 +59,8 @@ function importNotes(cloud: CloudDocument): string {
 }
 
 function startForm(options: CloudCardOptions): HTMLElement {
-  const scale = numberField("Base scale", DEFAULT_SCALE_PERCENT, { unit: "% of the diagonal" });
+  const field = textField("Scales", scalesText(DEFAULT_SCALES), "% of the diagonal");
+  const fault = h("p", { class: "hint obstacle start-fault", aria: { live: "polite" } });
   const button = h(
     "button",
     { type: "submit", class: "button primary", aria: { label: `New session of ${options.cloud.name}` } },
@@ -74,25 +73,26 @@ function startForm(options: CloudCardOptions): HTMLElement {
       class: "start-form",
       onsubmit: (event) => {
         event.preventDefault();
-        const percent = scale.value;
-        if (!(percent > 0 && percent <= MAX_SCALE_PERCENT)) {
-          scale.input.setAttribute("aria-invalid", "true");
-          scale.input.focus();
+        const scales = parseScales(field.input.value);
+        const wrong = typeof scales === "string";
+        field.input.setAttribute("aria-invalid", String(wrong));
+        setText(fault, wrong ? scales : "");
+        if (wrong) {
+          field.input.focus();
           return;
         }
         button.disabled = true;
-        void options.start(percent / 100).finally(() => {
+        void options.start(scales).finally(() => {
           button.disabled = false;
         });
       },
     },
-    scale.element,
+    field.element,
     button,
+    fault,
   );
-  scale.input.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") form.requestSubmit();
-  });
-  scale.input.title = `What counts as detail: everything finer than this. 0 to ${MAX_SCALE_PERCENT} %.`;
+  field.input.title =
+    "A base level for each: what is finer than its scale rides along as detail. Coarsest first.";
   return form;
 }
 

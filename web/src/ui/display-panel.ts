@@ -1,4 +1,5 @@
 import type { SessionDocument } from "../api/types";
+import { levelName } from "../edits/scales";
 import { DEFAULT_DISPLAY, type DisplayMode, type DisplaySettings } from "../scene/display";
 import type { Bus } from "../session-store";
 import { append, h } from "./dom";
@@ -40,7 +41,7 @@ export function createDisplayPanel(
     ["full", "Full surface"] as const,
     ...session.levels
       .slice(0, -1)
-      .map((level) => [String(level.level), `Base, level ${level.level}`] as const),
+      .map((level) => [String(level.level), levelName(level, session.diagonal)] as const),
   ];
   const level = selectField<string>(
     "Level",

@@ -67,6 +67,30 @@ export function numberField(label: string, value: number, options: NumberOptions
   };
 }
 
+/** A line of text; what it means is the caller's. */
+export function textField(
+  label: string,
+  value: string,
+  unit: string,
+): { element: HTMLElement; input: HTMLInputElement } {
+  const id = freshId();
+  const input = h("input", {
+    id,
+    type: "text",
+    autocomplete: "off",
+    spellcheck: false,
+    class: "number",
+    value,
+  });
+  const element = h(
+    "div",
+    { class: "field" },
+    h("label", { htmlFor: id }, label),
+    h("div", { class: "input-box" }, input, h("span", { class: "unit" }, unit)),
+  );
+  return { element, input };
+}
+
 /** Three numbers in a row, under one name. */
 export interface VectorField {
   element: HTMLElement;

@@ -1,6 +1,7 @@
 import type { ApiClient } from "../api/client";
 import { problemOf } from "../api/problem";
 import type { CloudDocument, SessionSummary } from "../api/types";
+import { DEFAULT_SCALES } from "../edits/scales";
 import { sessionUrl } from "../link";
 import { createCloudCard } from "./cloud-card";
 import { h, replaceChildren, setText } from "./dom";
@@ -15,9 +16,9 @@ export async function showHome(root: HTMLElement, client: ApiClient): Promise<vo
   const messages = h("div", { class: "home-messages", aria: { live: "polite" } });
   const uploader = createUploader(client, (cloud) => void open(cloud));
 
-  const open = async (cloud: CloudDocument, scale?: number): Promise<void> => {
+  const open = async (cloud: CloudDocument, scales = DEFAULT_SCALES): Promise<void> => {
     try {
-      const options = scale === undefined ? { name: cloud.name } : { name: cloud.name, scale };
+      const options = { name: cloud.name, scales };
       location.assign(sessionUrl((await client.createSession(cloud.id, options)).id));
     } catch (error) {
       replaceChildren(messages, problemCard("No session could be started", problemOf(error)));
@@ -41,7 +42,7 @@ export async function showHome(root: HTMLElement, client: ApiClient): Promise<vo
         createCloudCard({
           cloud,
           sessions: sessionsOf(cloud, sessions),
-          start: (scale) => open(cloud, scale),
+          start: (scales) => open(cloud, scales),
           removeCloud: () => act("The cloud was not deleted", () => client.deleteCloud(cloud.id)),
           removeSession: (id) => act("The session was not deleted", () => client.deleteSession(id)),
         }),

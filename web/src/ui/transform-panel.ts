@@ -1,9 +1,11 @@
+import type { SessionDocument } from "../api/types";
 import { describeDeformation, rotation, translation } from "../edits/deformation";
+import { levelName } from "../edits/scales";
 import type { TransformEditor } from "../edits/transform";
 import type { ToolName, TransformState } from "../event-map";
 import type { Bus } from "../session-store";
 import { append, h, replaceChildren, setText } from "./dom";
-import { checkField, numberField, vectorField } from "./fields";
+import { numberField, selectField, vectorField } from "./fields";
 import { icon } from "./icons";
 import { createSection } from "./section";
 
@@ -16,7 +18,11 @@ export interface TransformPanel {
 }
 
 /** The transform in numbers: the same one that the handles make. */
-export function createTransformPanel(bus: Bus, editor: TransformEditor): TransformPanel {
+export function createTransformPanel(
+  bus: Bus,
+  session: SessionDocument,
+  editor: TransformEditor,
+): TransformPanel {
   const section = createSection("Transform");
   const commit = (): void => void bus.invoke("edit.commit");
   let tool: ToolName = "orbit";
@@ -73,9 +79,17 @@ export function createTransformPanel(bus: Bus, editor: TransformEditor): Transfo
     { type: "button", class: "button", onclick: () => bus.invoke("edit.cancel") },
     "Cancel",
   );
-  const carry = checkField("Carry the detail along", shown.carryDetail, (checked) =>
-    editor.setCarryDetail(checked),
+  const finest = session.levels.length - 1;
+  const level = selectField(
+    "Edited level",
+    session.levels.map((each) => [
+      String(each.level),
+      each.level === finest ? "Full surface, no detail carried" : levelName(each, session.diagonal),
+    ]),
+    String(shown.level),
+    (value) => editor.setLevel(Number(value)),
   );
+  level.select.title = "The level that moves; everything finer than its scale is carried along as detail.";
   const summary = h("p", { class: "hint", aria: { live: "polite" } });
   const fields = h("div", { class: "transform-fields" });
   const start = h(
@@ -103,7 +117,7 @@ export function createTransformPanel(bus: Bus, editor: TransformEditor): Transfo
       ...axisButtons,
     );
     const ends = h("div", { class: "button-row" }, apply, cancel);
-    if (tool === "move") replaceChildren(fields, vector.element, axes, pivotButton, carry.element, ends);
+    if (tool === "move") replaceChildren(fields, vector.element, axes, pivotButton, level.element, ends);
     else if (tool === "rotate")
       replaceChildren(
         fields,
@@ -112,7 +126,7 @@ export function createTransformPanel(bus: Bus, editor: TransformEditor): Transfo
         axes,
         pivot.element,
         pivotButton,
-        carry.element,
+        level.element,
         ends,
       );
     else replaceChildren(fields, start);
@@ -130,7 +144,7 @@ export function createTransformPanel(bus: Bus, editor: TransformEditor): Transfo
       angle.set(0);
     }
     pivot.set(state.pivot);
-    carry.input.checked = state.carryDetail;
+    level.select.value = String(state.level);
     const ready = state.obstacle === null && editor.pending;
     apply.disabled = !ready;
     cancel.disabled = !ready;

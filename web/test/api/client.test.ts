@@ -54,12 +54,16 @@ test("a preview carries its sequence number beside the edit", async () => {
   expect(JSON.parse(String(calls[0]?.init?.body)).sequence).toBe(41);
 });
 
-test("a session asks for its scale only where one was chosen", async () => {
+test("a session asks for scales only where some were chosen", async () => {
   const { client, calls } = clientAnswering(() => json({ id: "s" }, 202));
   await client.createSession("cloud");
-  await client.createSession("cloud", { name: "n", scale: 0.03 });
+  await client.createSession("cloud", { name: "n", scales: [0.03, 0.01] });
   expect(JSON.parse(String(calls[0]?.init?.body))).toEqual({ cloud: "cloud" });
-  expect(JSON.parse(String(calls[1]?.init?.body))).toEqual({ cloud: "cloud", name: "n", scales: [0.03] });
+  expect(JSON.parse(String(calls[1]?.init?.body))).toEqual({
+    cloud: "cloud",
+    name: "n",
+    scales: [0.03, 0.01],
+  });
 });
 
 test("a refusal becomes an error with all that the problem document says", async () => {
