@@ -17,6 +17,8 @@ namespace pointwright {
 namespace {
 
 constexpr std::size_t kCancelInterval = std::size_t{1} << 16;
+constexpr std::size_t kWeightLevels = 2048;
+constexpr std::size_t kCacheLine = 64;
 constexpr std::uint16_t kUntouched = std::numeric_limits<std::uint16_t>::max();
 
 // An edge with its weight and side as the kernel packs them.
@@ -37,7 +39,8 @@ std::uint32_t pack_edge(const Points& points, const Points& normals, std::size_t
   const Vec3f e = points[b] - points[a];
   const float along = dot(e, normals[a]) * dot(e, normals[b]);
   const float agreement = dot(normals[a], normals[b]) - 2.0F * along / std::max(dot(e, e), 1e-30F);
-  const float weight = std::clamp(1.0F - std::abs(agreement), 0.0F, 1.0F) * 65535.0F;
+  const float weight =
+      std::sqrt(std::clamp(1.0F - std::abs(agreement), 0.0F, 1.0F)) * static_cast<float>(kWeightLevels - 1);
   return (static_cast<std::uint32_t>(weight) << 1) | (agreement < 0.0F ? 1U : 0U);
 }
 
@@ -226,24 +229,25 @@ class ForestBuilder {
       const std::uint64_t edge = pack_edge(points_, normals_, i - 1, i);
       found[count++] = (edge >> 1 << 48) | ((a - 1) << 32) | (a << 16) | (edge & 1U);
     }
-    const auto lists = std::make_unique_for_overwrite<std::int32_t[]>(n * padded_to_block(k));
-    const RegionEdgesArgs edge_args{
-        .neighbors = graph_.lanes.data(), .packed = packed.get(), .lists = lists.get(), .k = k};
+    // A list on two cache lines would be read twice.
+    std::size_t space = n * padded_to_block(k) * sizeof(std::int32_t) + kCacheLine;
+    const auto room = std::make_unique_for_overwrite<std::byte[]>(space);
+    void* lists = room.get();
+    std::align(kCacheLine, space - kCacheLine, lists, space);
+    const RegionEdgesArgs edge_args{.neighbors = graph_.lanes.data(),
+                                    .packed = packed.get(),
+                                    .lists = static_cast<std::int32_t*>(lists),
+                                    .k = k};
     count += POINTWRIGHT_KERNEL(region_edges_kernel)(edge_args, begin, end, found.get() + count);
     return sorted_by_weight(found.get(), count);
   }
 
-  static EdgeList sorted_by_weight(std::uint64_t* edges, std::size_t count) {
+  static EdgeList sorted_by_weight(const std::uint64_t* edges, std::size_t count) {
     EdgeList sorted{std::make_unique_for_overwrite<std::uint64_t[]>(count), count};
-    auto buffer = std::make_unique_for_overwrite<std::uint64_t[]>(count);
-    std::array<std::array<std::uint32_t, 257>, 2> cursor{};  // of the weight's low and high byte
-    for (std::size_t e = 0; e < count; ++e) {
-      ++cursor[0][((edges[e] >> 48) & 0xffU) + 1U];
-      ++cursor[1][(edges[e] >> 56) + 1U];
-    }
-    for (auto& sums : cursor) std::partial_sum(sums.begin(), sums.end(), sums.begin());
-    for (std::size_t e = 0; e < count; ++e) buffer[cursor[0][(edges[e] >> 48) & 0xffU]++] = edges[e];
-    for (std::size_t e = 0; e < count; ++e) sorted.edges[cursor[1][buffer[e] >> 56]++] = buffer[e];
+    std::array<std::uint32_t, kWeightLevels + 1> cursor{};
+    for (std::size_t e = 0; e < count; ++e) ++cursor[(edges[e] >> 48) + 1U];
+    std::partial_sum(cursor.begin(), cursor.end(), cursor.begin());
+    for (std::size_t e = 0; e < count; ++e) sorted.edges[cursor[edges[e] >> 48]++] = edges[e];
     return sorted;
   }
 

@@ -22,8 +22,9 @@ struct SidedForest {
 
 /// Joins neighbours along the edges on which the reflected normals agree best: the minimum spanning forest of
 /// the symmetric neighbour graph, adjacent duplicates joined too. With e the unit vector of an edge, n_a is
-/// reflected in the plane perpendicular to e, r = n_a - 2 e (e . n_a); the edge's weight is 1 - |r . n_b| in
-/// 65,536 steps and the sides are opposed where r . n_b < 0.
+/// reflected in the plane perpendicular to e, r = n_a - 2 e (e . n_a); the edge's weight is
+/// sqrt(1 - |r . n_b|), which grows with the angle between the two, in 2,048 steps, and the sides are opposed
+/// where r . n_b < 0.
 ///
 /// Regions of consecutive samples are spanned at the same time. Inside one, Kruskal's algorithm joins two
 /// trees while one of them has no lighter edge that leaves the region: such an edge is in every minimum

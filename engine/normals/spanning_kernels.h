@@ -24,14 +24,14 @@ struct EdgeWeightArgs {
 struct RegionEdgesArgs {
   const std::uint32_t* neighbors;  ///< the blocked graph
   const std::int32_t* packed;      ///< from the region's first block on
-  std::int32_t* lists;             ///< room for 16 ceil(k / 16) numbers a sample, padded to whole blocks
+  std::int32_t* lists;             ///< room for 16 ceil(k / 16) numbers a sample; best aligned to 64 bytes
   std::uint32_t k;
 };
 
 }  // namespace pointwright
 
 /// The edges of the samples [begin, end), both at whole blocks: `edges` takes [block][j][lane] from begin's
-/// block on, twice the weight (0 to 65,535) plus 1 where the sides are opposed.
+/// block on, twice the weight (0 to 2,047) plus 1 where the sides are opposed.
 POINTWRIGHT_DECLARE_KERNEL(void edge_weights_kernel(const EdgeWeightArgs& args, std::size_t begin,
                                                     std::size_t end, std::int32_t* edges))
 

@@ -37,7 +37,7 @@ Edge weighed(const Points& points, const Points& normals, std::uint32_t a, std::
   };
   const float along = dot(e, normals[a]) * dot(e, normals[b]);
   const float agreement = dot(normals[a], normals[b]) - 2.0F * along / std::max(dot(e, e), 1e-30F);
-  const float weight = std::clamp(1.0F - std::abs(agreement), 0.0F, 1.0F) * 65535.0F;
+  const float weight = std::sqrt(std::clamp(1.0F - std::abs(agreement), 0.0F, 1.0F)) * 2047.0F;
   return {.weight = static_cast<std::uint32_t>(weight), .a = a, .b = b, .opposed = agreement < 0.0F};
 }
 
