@@ -36,13 +36,13 @@ struct ReconstructParams {
 Result<void> validate(const ReconstructParams& params, const MultiresSurface& surface);
 
 /// Rebuilds the levels finer than params.level of `surface`, whose samples on that level now stand as `moved`
-/// says: p'_{k+1} = p_{k+1} + (p'_k - p_k) + d_k (g_k n'_k - n_k), which is Eq. (5) written so that an unmoved
-/// sample with gain 1 keeps its bits. The result's detail is that of the new surface: g_k d_k.
+/// says: p'_{k+1} = p_{k+1} + (p'_k - p_k) + d_k (g_k n'_k - n_k), which is Eq. (5) written so that an
+/// unmoved sample with gain 1 keeps its bits. The result's detail is that of the new surface: g_k d_k.
 /// Paper:       §3, Eq. 5; gains and carried normals are beyond it
 /// Shapes:      the surface's N samples; `graph` of its finest level's rest samples
 /// Errors:      kInvalidArgument, kCancelled
-/// Promises:    the identity to the bit with kCarried and gains 1; a rigid motion of the level moves everything
-///              rigidly, to 1e-6 of the diagonal
+/// Promises:    the identity to the bit with kCarried and gains 1; a rigid motion of the level moves all of
+///              it rigidly, to 1e-6 of the diagonal
 /// Cost:        O(N k) a level, vectorised, parallel
 /// Determinism: bitwise equal for any thread count and instruction set
 /// Cancels:     between levels and blocks of samples

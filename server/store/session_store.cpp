@@ -16,8 +16,8 @@ namespace {
 constexpr std::uint64_t kBytesPerSample = 400;
 /// What another band adds to a surface: positions, normals and the detail coefficient.
 constexpr std::uint64_t kBytesPerBand = 28;
-/// Surfaces of a session that are not in its history: the committed, the previewed, the shown, and one that is
-/// being made.
+/// Surfaces of a session that are not in its history: the committed, the previewed, the shown, and one that
+/// is being made.
 constexpr std::uint64_t kLiveSurfaces = 4;
 /// Stored history states that a session may need at most before it thins them out, and the bytes a sample of
 /// one with one band.

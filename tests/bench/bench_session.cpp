@@ -35,7 +35,8 @@ void bench_scan(BenchReport& report, const std::string& label, std::size_t n) {
   const auto open = [&] {
     auto imported = read_cloud(encoded.value(), CloudFormat::kDraco, params);
     if (!imported) std::abort();
-    auto hierarchy = build_hierarchy(imported.value().cloud, HierarchyParams{.scales = kThreeScales}, ExecutionContext{});
+    auto hierarchy =
+        build_hierarchy(imported.value().cloud, HierarchyParams{.scales = kThreeScales}, ExecutionContext{});
     if (!hierarchy) std::abort();
     return std::pair(std::move(imported).value(), std::move(hierarchy).value());
   };

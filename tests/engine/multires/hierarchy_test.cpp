@@ -25,9 +25,9 @@ Hierarchy built(const Cloud& cloud, const HierarchyParams& params = {}) {
   return std::move(result).value();
 }
 
-// The largest |p_{k+1} - (p_k + d_k n_k)| of all bands over the diagonal, or over the largest coordinate where
-// that is more: floats have no finer steps there. Infinite where anything is not finite or a normal is not
-// unit.
+// The largest |p_{k+1} - (p_k + d_k n_k)| of all bands over the diagonal, or over the largest coordinate
+// where that is more: floats have no finer steps there. Infinite where anything is not finite or a normal is
+// not unit.
 double identity_error(const Cloud& cloud, const Hierarchy& hierarchy) {
   const MultiresSurface& surface = hierarchy.surface;
   const Box3f box = bounds_of(cloud.position);
