@@ -109,7 +109,10 @@ Result<void> GlobalVolume::restore(Packed& points, std::uint32_t steps) {
   });
   const double loss = std::abs(1.0 - 1.0 / factor) / static_cast<double>(std::max(steps, 1U));
   due_ = static_cast<std::uint32_t>(std::clamp(kLossBetween / std::max(loss, 1e-9), 1.0, kMostSteps));
+  return {};
+}
 
+void GlobalVolume::follow(const Packed& points) {
   Points fitted;
   estimate_normals(points.unpacked(), *graph_, NormalParams{}, fitted);
   parallel_for(fitted.size(), [&](std::size_t begin, std::size_t end) {
@@ -120,7 +123,6 @@ Result<void> GlobalVolume::restore(Packed& points, std::uint32_t steps) {
   });
   average_normals();
   volume_ = moments(points).volume;
-  return {};
 }
 
 }  // namespace pointwright

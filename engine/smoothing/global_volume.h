@@ -18,8 +18,8 @@ namespace pointwright {
 /// Noise also enlarges the a_i, so two volumes that are measured apart do not compare. Therefore areas and
 /// normals are held while the samples move: V is then linear in the positions, its change is that of the true
 /// volume to first order, exact where the surface only shrinks, and an error common to all areas cancels. The
-/// normals are fitted anew after each restoring, and restoring is done often enough that no more than about
-/// half a percent of length is lost between.
+/// normals are fitted anew after each restoring that more steps follow, and restoring is done often enough
+/// that no more than about half a percent of length is lost between.
 class GlobalVolume {
  public:
   /// Errors: kInvalidArgument (field "preserve") for samples that enclose no volume: where the area vectors
@@ -36,6 +36,9 @@ class GlobalVolume {
   /// Scales the samples about their centroid to the volume that they had before.
   /// Errors: kInvalidArgument (field "preserve") where the steps took all of the volume
   Result<void> restore(Packed& points, std::uint32_t steps);
+
+  /// Fits the normals anew to restored samples, before further steps.
+  void follow(const Packed& points);
 
  private:
   struct Moments {

@@ -15,12 +15,12 @@ namespace pointwright {
 /// The variance that plain steps have given to the weights of each sample's neighbourhood.
 ///
 /// Free steps: rows of W^n, about the mean, to which samples drift (spread_step). Steps along the normals
-/// leave the drift out (level_weights in the source) and keep the mean on the sample: a step adds its gain and
-/// carries on, under the same weights, what the neighbours have, in double precision. The first of them takes
-/// the normals that it is given for the surface's own, which have no error of a fit: its gain is the plain
-/// one. No sample is credited with more than weights can have whose mean is the sample and which stay in the
-/// box of all samples that its steps can reach, (p - min)(max - p) an axis: gains alone would go on growing on
-/// an object that is smaller than the scale, and in clusters that no neighbour leaves.
+/// leave the drift out (level_weights in the source) and keep the mean on the sample: a step adds its gain
+/// and carries on, under the same weights, what the neighbours have, in double precision. The first of them
+/// takes the normals that it is given for the surface's own, which have no error of a fit: its gain is the
+/// plain one. No sample is credited with more than weights can have whose mean is the sample and which stay
+/// in the box of all samples that its steps can reach, (p - min)(max - p) an axis: gains alone would go on
+/// growing on an object that is smaller than the scale, and in clusters that no neighbour leaves.
 /// Cost: O(N k) a step, parallel; bitwise equal for any thread count
 class KernelVariance {
  public:

@@ -118,8 +118,8 @@ struct Stencil {
   std::array<double, kMostEntries> weight{};
 };
 
-// Weights that reproduce polynomials of kTerms = 1, 3 or 6 coefficients at the origin. False where the samples
-// do not carry a fit.
+// Weights that reproduce polynomials of kTerms = 1, 3 or 6 coefficients at the origin. False where the
+// samples do not carry a fit.
 template <int kTerms>
 bool fit(const Stencil& stencil, std::array<double, kMostEntries>& result) {
   using Basis = Eigen::Matrix<double, kTerms, 1>;
@@ -146,8 +146,9 @@ bool fit(const Stencil& stencil, std::array<double, kMostEntries>& result) {
   return std::abs(sum - 1.0) < 1e-6 && size <= kGreatestWeights;
 }
 
-// Least-squares weights by distance, and places in units of the farthest one's. Compact, close to the Gaussian
-// exp(-d^2 / 1.2 h^2): weights are small where the set of neighbours changes. False where all are in one place.
+// Least-squares weights by distance, and places in units of the farthest one's. Compact, close to the
+// Gaussian exp(-d^2 / 1.2 h^2): weights are small where the set of neighbours changes. False where all are in
+// one place.
 bool weigh(Stencil& stencil, const std::array<double, kMostEntries>& distance_sq) {
   const double farthest_sq = *std::max_element(distance_sq.begin(), distance_sq.end());
   if (farthest_sq <= 0.0) return false;

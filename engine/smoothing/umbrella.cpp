@@ -122,6 +122,7 @@ Result<Points> smooth(const Points& points, const Points& normals, const Neighbo
     ++since_restored;
     if (since_restored < volume->steps_until_due() && iteration + 1 < params.iterations) continue;
     if (const auto restored = volume->restore(current, since_restored); !restored) return restored.error();
+    if (iteration + 1 < params.iterations) volume->follow(current);
     since_restored = 0;
   }
   return current.unpacked();

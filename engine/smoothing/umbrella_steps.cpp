@@ -116,8 +116,8 @@ void compensated_step(const UmbrellaOperator& umbrella, const ReverseNeighbors& 
   });
 }
 
-// K' = (1 - lambda) K + lambda W K, and about another center: sum_m K_jm |r_m - r_i|^2 = S_j + 2 (q_j - r_j) .
-// (r_j - r_i) + |r_j - r_i|^2, q_j = sum_m K_jm r_m being sample j's position now.
+// K' = (1 - lambda) K + lambda W K, and about another center: sum_m K_jm |r_m - r_i|^2 = S_j + 2 (q_j - r_j)
+// . (r_j - r_i) + |r_j - r_i|^2, q_j = sum_m K_jm r_m being sample j's position now.
 void spread_step(const NeighborGraph& graph, float lambda, const Packed& rest, const Packed& from,
                  Packed& to) {
   const Float4* r = rest.data();

@@ -75,8 +75,8 @@ Plan plain_plan(const Levels& levels, std::size_t depth, const VCycleParams& par
 }
 
 // Compensated steps take a wave down by exp(-n lambda mu^2), mu = (2 pi / L)^2 g / 2 with g the variance of a
-// plain step. At L = pi sqrt 2 s, where a Gaussian gives 1 / e, mu = g / s^2: the exponents of all levels, and
-// those of Psi^-1, variance / s^2, add up to 1.
+// plain step. At L = pi sqrt 2 s, where a Gaussian gives 1 / e, mu = g / s^2: the exponents of all levels,
+// and those of Psi^-1, variance / s^2, add up to 1.
 Plan compensated_plan(const Levels& levels, std::size_t depth, const VCycleParams& params) {
   const auto lambda = static_cast<double>(params.lambda);
   const double scale_sq = static_cast<double>(params.scale) * static_cast<double>(params.scale);

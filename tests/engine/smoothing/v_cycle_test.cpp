@@ -86,8 +86,9 @@ double half_attenuation(const std::vector<std::pair<double, double>>& table) {
 }
 
 TEST_CASE("the V-cycle takes waves down as the scale says, the shorter the more") {
-  // Half of the amplitude is left at L = s pi sqrt 2 / sqrt(ln 2), 5.34 s, of a Gaussian, and at s pi sqrt 2 /
-  // (ln 2)^(1/4), 4.87 s, of compensated steps. Where fine offsets were added back, waves of 1.5 s would stay.
+  // Half of the amplitude is left at L = s pi sqrt 2 / sqrt(ln 2), 5.34 s, of a Gaussian, and at s pi sqrt 2
+  // / (ln 2)^(1/4), 4.87 s, of compensated steps. Where fine offsets were added back, waves of 1.5 s would
+  // stay.
   constexpr std::size_t kSide = 200;
   for (const Sampling sampling : {Sampling::kJittered, Sampling::kRandom}) {
     for (const double scale : {4.0, 8.0}) {
@@ -181,9 +182,9 @@ Harmonic harmonic_of(const Points& points) {
 TEST_CASE(
     "a scale means the same on 20,000 and on 320,000 samples of one object, and samples do not pile up") {
   // Heat flow over time t = s^2 / 2 takes a sphere's radius down to exp(-2 t), and a bump pattern P_l along
-  // its normals, whose coordinates are harmonics of degree l - 1 and l + 1, by l / (2 l + 1) exp(-l (l - 1) t)
-  // + (l + 1) / (2 l + 1) exp(-(l + 1) (l + 2) t). Spacings are 0.025 and 0.0063. The grid of the coarse levels
-  // leaves a pattern of its own on the sphere, which is taken off.
+  // its normals, whose coordinates are harmonics of degree l - 1 and l + 1, by l / (2 l + 1) exp(-l (l - 1)
+  // t) + (l + 1) / (2 l + 1) exp(-(l + 1) (l + 2) t). Spacings are 0.025 and 0.0063. The grid of the coarse
+  // levels leaves a pattern of its own on the sphere, which is taken off.
   constexpr double kScale = 0.09;
   constexpr double kTime = 0.5 * kScale * kScale;
   constexpr double kBumps = 0.004;
