@@ -1,6 +1,6 @@
 /** The smoothing scales of a session's base levels, as people type and read them: percent of the diagonal. */
 
-export const DEFAULT_SCALES = [0.04, 0.02, 0.01];
+export const DEFAULT_SCALES = [0.02, 0.01, 0.005];
 export const MAX_BANDS = 8;
 export const MAX_SCALE_PERCENT = 20;
 /** Neighbouring scales are at least this far apart: the server's rule. */
