@@ -137,7 +137,8 @@ TEST_CASE("the examples of requests pass their parsers and come back the same") 
 TEST_CASE("what the server sends of paintings and edits passes the parsers of requests") {
   const Json painting = parse_json(read_file("examples/painting.json")).value();
   CHECK(parse_painting(Json{{"operations", painting["operations"]}}).ok());
-  for (const Json& record : parse_json(read_file("examples/edit-list.json")).value()["edits"]) {
+  const Json list = parse_json(read_file("examples/edit-list.json")).value();
+  for (const Json& record : list["edits"]) {
     CHECK(parse_edit(record["edit"]).ok());
   }
 }
