@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -35,10 +36,25 @@ constexpr std::size_t kMostEntries = 1 + kNeighbors;
 // Medians over a fixed stride of the samples: about this many are enough.
 constexpr std::size_t kMedianSamples = 65'536;
 
+// Median of the local spacing; as local_spacing() has it, but short rows count as long as they are.
+float median_spacing(const Points& points, const NeighborGraph& graph) {
+  std::vector<float> spacing(points.size(), 0.0F);
+  parallel_for(points.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      std::uint32_t count = graph.k;
+      while (count > 0 && graph.index(i, count - 1) == i) --count;
+      if (count == 0) continue;
+      const float radius = (points[graph.index(i, count - 1)] - points[i]).norm();
+      spacing[i] = radius * std::sqrt(std::numbers::pi_v<float> / (static_cast<float>(count) + 0.5F));
+    }
+  });
+  return median(std::move(spacing));
+}
+
 LevelMeasure measured(const Points& points, const NeighborGraph& graph, std::uint32_t steps,
                       const ExecutionContext* context) {
   LevelMeasure result;
-  result.spacing = median(local_spacing(points, graph));
+  result.spacing = median_spacing(points, graph);
   if (graph.k == 0) return result;
   KernelVariance variance(points, {}, graph, SmoothingDirection::kFree);
   double before = 0.0;

@@ -68,6 +68,10 @@ struct Coarsening {
 };
 using Coarsener = std::function<Result<Coarsening>(const Points&, const Points&, const NeighborGraph&)>;
 
+/// Psi by pair contraction (§3.2), to a quarter of the samples, with the length term that keeps them even.
+/// The context, where there is one, must outlive it.
+Coarsener contracting_coarsener(const ExecutionContext* context = nullptr);
+
 /// Levels until the spacing is more than a third of `scale`, the largest that the hierarchy will be used for,
 /// or 100 samples are left, or a level has more than three quarters of the one before.
 /// Psi^-1 is a degree-2 moving least-squares fit at the finer sample's place in the parent's tangent plane,

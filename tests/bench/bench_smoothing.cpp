@@ -8,7 +8,6 @@
 #include "engine/smoothing/v_cycle.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/synthetic_scan.h"
-#include "tests/support/voxel_coarsener.h"
 
 namespace pointwright::bench {
 namespace {
@@ -54,7 +53,7 @@ Scan oriented_scan(std::size_t samples) {
 void bench_v_cycle(BenchReport& report) {
   const auto hierarchy_of = [](const Scan& scan, float scale) {
     return build_smoothing_hierarchy(scan.cloud.position, scan.normal, scan.graph, scale,
-                                     test::coarsen_by_voxels);
+                                     contracting_coarsener());
   };
   const auto time_cycle = [&](const char* name, const Scan& scan, const SmoothingHierarchy& hierarchy,
                               const VCycleParams& params) {

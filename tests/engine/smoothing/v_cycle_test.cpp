@@ -29,11 +29,11 @@ struct Rest {
   SmoothingHierarchy hierarchy;
 };
 
-Rest rest_of(Surface surface, double scale) {
+Rest rest_of(Surface surface, double scale, const Coarsener& coarsen = coarsen_by_voxels) {
   Rest rest{.surface = std::move(surface), .graph = {}, .hierarchy = {}};
   rest.graph = build_neighbor_graph(rest.surface.position, 10);
   auto hierarchy = build_smoothing_hierarchy(rest.surface.position, rest.surface.normal, rest.graph,
-                                             static_cast<float>(scale), coarsen_by_voxels);
+                                             static_cast<float>(scale), coarsen);
   REQUIRE(hierarchy.ok());
   rest.hierarchy = std::move(hierarchy).value();
   return rest;
@@ -117,6 +117,44 @@ TEST_CASE("the V-cycle takes waves down as the scale says, the shorter the more"
         CHECK(relative_error(half, is_plain ? 5.336 : 4.869) < (is_plain ? 0.03 : 0.07));
       }
     }
+  }
+}
+
+TEST_CASE("over contracted levels, an octave each, waves go down as the scale says") {
+  constexpr double kScale = 8.0;
+  constexpr std::size_t kSide = 200;
+  for (const Sampling sampling : {Sampling::kJittered, Sampling::kRandom}) {
+    double before = 0.0;
+    for (const double ratio : {3.0, 4.5, 6.0, 9.0}) {
+      const double wavelength = ratio * kScale;
+      const double height = 0.01 * wavelength;
+      const Rest rest =
+          rest_of(wave(kSide, 1.0, sampling, height, wavelength), kScale, contracting_coarsener());
+      const VCycle smoothed = cycle(rest, {.scale = kScale});
+      CHECK(smoothed.depth == 2);
+      CHECK(smoothed.coarsest_spacing > static_cast<float>(kScale / 3.0));
+      CHECK(smoothed.coarsest_spacing < static_cast<float>(kScale / 1.5));
+      const double left = amplitude(smoothed.points, wavelength, 0.5 * kSide, 4.0 * kScale) / height;
+      const double effective = wavelength / kTau * std::sqrt(-2.0 * std::log(left));
+      MESSAGE("wavelength " << ratio << " scales: " << left << ", effective scale " << effective / kScale);
+      CHECK(left > before);
+      CHECK(relative_error(effective, kScale) < 0.05);
+      CHECK(nearest_distance(smoothed.points) >= 0.5 * nearest_distance(rest.surface.position));
+      before = left;
+    }
+  }
+}
+
+TEST_CASE("sheets that the coarse spacing would join stay apart") {
+  // Five spacings apart, so that the finest level's neighbours, of corners too, stay in one sheet; the ten
+  // neighbours on the coarsest level reach eight far and are looked for on one side.
+  const Rest rest =
+      rest_of(parallel_sheets(100, 1.0, 5.0, Sampling::kJittered), 8.0, contracting_coarsener());
+  REQUIRE(rest.hierarchy.coarse.size() == 2);
+  CHECK(rest.hierarchy.coarse.back().measure.spacing > 3.0F);
+  const VCycle smoothed = cycle(rest, {.scale = 8.0F, .direction = SmoothingDirection::kFree});
+  for (std::size_t i = 0; i < smoothed.points.size(); ++i) {
+    CHECK(std::abs(smoothed.points[i].z() - rest.surface.position[i].z()) < 1e-3F);
   }
 }
 
