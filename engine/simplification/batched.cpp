@@ -21,7 +21,7 @@ constexpr std::size_t kBlock = 1024;            // nodes of a parallel block
 constexpr std::size_t kBatch = 64;              // nodes whose pairs are rated together
 // Rounds contract this much beyond the goal, of the samples to be left; the cheapest contractions of all
 // count. What is dear in an early round can be cheap beside what comes later.
-constexpr double kSurplus = 0.1;
+constexpr double kSurplus = 0.5;
 
 std::uint32_t bits_of(float cost) {
   return std::bit_cast<std::uint32_t>(cost);

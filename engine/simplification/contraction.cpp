@@ -21,7 +21,7 @@ float unit_scale(const Points& position) {
 }  // namespace
 
 ContractionNodes::ContractionNodes(const Points& position, const Points& normal, const NeighborGraph& graph,
-                                   const ExecutionContext* context)
+                                   bool separate_sheets, const ExecutionContext* context)
     : nodes_(std::make_unique_for_overwrite<ContractionNode[]>(padded_to_block(position.size()))),
       count_(position.size()),
       scale_(unit_scale(position)) {
@@ -34,6 +34,7 @@ ContractionNodes::ContractionNodes(const Points& position, const Points& normal,
                             .neighbors = graph.lanes.data(),
                             .k = graph.k,
                             .scale = scale_,
+                            .separate_sheets = separate_sheets,
                             .nodes = nodes_[0].fields};
   const auto build = POINTWRIGHT_KERNEL(build_nodes_kernel);
   parallel_for(

@@ -62,7 +62,7 @@ struct ContractionLog {
 class ContractionNodes {
  public:
   ContractionNodes(const Points& position, const Points& normal, const NeighborGraph& graph,
-                   const ExecutionContext* context);
+                   bool separate_sheets, const ExecutionContext* context);
 
   [[nodiscard]] float scale() const { return scale_; }
   [[nodiscard]] std::size_t count() const { return count_; }

@@ -23,8 +23,9 @@ struct NodeKernelArgs {
   const float* normal_z;
   const std::uint32_t* neighbors;
   std::uint32_t k;
-  float scale;   ///< of the positions, a power of two
-  float* nodes;  ///< padded samples x kNodeFloats
+  float scale;           ///< of the positions, a power of two
+  bool separate_sheets;  ///< neighbours of opposed normals span no plane
+  float* nodes;          ///< padded samples x kNodeFloats
 };
 
 /// Pairs of nodes, first < second, padded to whole blocks of 16 with any valid pair.

@@ -161,7 +161,7 @@ Result<Simplification> simplify(const Points& position, const Points& normal, co
   Simplification result{.placement = params.placement};
   result.record.neighbor_first.assign(1, 0);
   if (n == 0) return result;
-  ContractionNodes nodes(position, normal, graph, context);
+  ContractionNodes nodes(position, normal, graph, params.separate_sheets, context);
   ContractionGoal goal{.length_weight = params.length_weight, .separate_sheets = params.separate_sheets};
   if (const auto* count = std::get_if<KeepCount>(&params.target)) goal.count = std::min(n, count->count);
   if (const auto* keep = std::get_if<KeepRatio>(&params.target)) {

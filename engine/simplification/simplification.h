@@ -51,8 +51,8 @@ struct SimplifyParams {
   /// 0.05 keeps the whole result even, as smoothing on it wants.
   float length_weight = 1e-5F;
   Placement placement = Placement::kOnSurface;
-  /// Never contracts a pair with n_i . n_j < 0, which stand on two sheets of a thin part. Wants consistently
-  /// oriented normals; with false their sides do not count.
+  /// Never contracts a pair with n_i . n_j < 0, which stand on two sheets of a thin part, and lets them span
+  /// no plane together. Wants consistently oriented normals; with false their sides do not count.
   bool separate_sheets = true;
   friend bool operator==(const SimplifyParams&, const SimplifyParams&) = default;
 };

@@ -7,6 +7,7 @@ namespace pointwright::bench {
 
 void bench_spatial(BenchReport& report);
 void bench_multires(BenchReport& report);
+void bench_simplification(BenchReport& report);
 void bench_smoothing(BenchReport& report);
 void bench_editing(BenchReport& report);
 void bench_frames(BenchReport& report);

@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
   pointwright::bench::BenchReport report(filter);
   pointwright::with_threads(threads, [&] {
     pointwright::bench::bench_spatial(report);
+    pointwright::bench::bench_simplification(report);
     pointwright::bench::bench_smoothing(report);
     pointwright::bench::bench_multires(report);
     pointwright::bench::bench_editing(report);
