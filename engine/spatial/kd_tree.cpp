@@ -2,8 +2,6 @@
 #include "engine/spatial/kd_tree.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
 
@@ -26,6 +24,14 @@ using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<f
                                                   PackedPoints, 3, std::uint32_t>;
 constexpr std::size_t kLeafSize = 12;
 
+// What to search below so that no point at this squared distance is missed: nanoflann looks at what is nearer
+// than the bound only, and adds up the distances to its boxes on the way down, with an error of a rounding a
+// level.
+float search_bound(float distance_sq) {
+  constexpr float kSlack = 1.00001F;
+  return distance_sq * kSlack + std::numeric_limits<float>::min();
+}
+
 // The nearest points so far, by distance, then index. nanoflann's own set keeps whichever of the points at
 // the last distance it meets first.
 class NearestSet {
@@ -45,12 +51,10 @@ class NearestSet {
     std::size_t at = full() ? count_ - 1 : count_++;
     for (; at > 0 && candidate < slots_[at - 1]; --at) slots_[at] = slots_[at - 1];
     slots_[at] = candidate;
-    if (full()) {  // the next float: squared distances are not negative
-      bound_ = std::bit_cast<float>(std::bit_cast<std::uint32_t>(slots_[count_ - 1].distance_sq) + 1U);
-    }
+    if (full()) bound_ = search_bound(slots_[count_ - 1].distance_sq);
     return true;
   }
-  // nanoflann looks at what is nearer than this: ties with the last one must come in, too.
+  // Ties with the last one must come in, too.
   // NOLINTNEXTLINE(readability-identifier-naming)
   [[nodiscard]] float worstDist() const { return bound_; }
 
@@ -106,11 +110,13 @@ bool KdTree::within(const Vec3f& query, float radius, std::size_t limit, std::ve
   found.clear();
   if (size() == 0 || !(radius >= 0.0F)) return false;
   std::vector<std::pair<std::uint32_t, float>> hits;
-  // nanoflann leaves out points exactly on the border; the next float includes them.
-  const float radius_sq = std::nextafter(radius * radius, std::numeric_limits<float>::max());
-  tree_->index->radiusSearch(query.data(), radius_sq, hits, nanoflann::SearchParams(32, 0.0F, false));
+  const float radius_sq = radius * radius;
+  tree_->index->radiusSearch(query.data(), search_bound(radius_sq), hits,
+                             nanoflann::SearchParams(32, 0.0F, false));
   found.reserve(hits.size());
-  for (const auto& [index, distance_sq] : hits) found.push_back({tree_->original(index), distance_sq});
+  for (const auto& [index, distance_sq] : hits) {
+    if (distance_sq <= radius_sq) found.push_back({tree_->original(index), distance_sq});
+  }
   std::sort(found.begin(), found.end());
   const bool cut = found.size() > limit;
   if (cut) found.resize(limit);
