@@ -126,11 +126,12 @@ class Greedy {
   }
 
   void contract(const ContractionPair& pair) {
-    const auto [a, b, cost] = pair;
+    const std::uint32_t a = pair.first;
+    const std::uint32_t b = pair.second;
     nodes_.contract(std::span(&pair, 1), merged_);
     nodes_.set(a, merged_.front());
     const float* f = merged_.front().fields;
-    node_cost_[a] = std::max({cost, node_cost_[a], node_cost_[b]});
+    node_cost_[a] = std::max({pair.cost, node_cost_[a], node_cost_[b]});
     std::vector<std::uint32_t> joined;
     std::set_union(adjacent_[a].begin(), adjacent_[a].end(), adjacent_[b].begin(), adjacent_[b].end(),
                    std::back_inserter(joined));
