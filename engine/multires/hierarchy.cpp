@@ -9,29 +9,13 @@
 #include "engine/core/parallel.h"
 #include "engine/multires/base_surface.h"
 #include "engine/multires/decomposition.h"
-#include "engine/normals/estimation.h"
-#include "engine/normals/orientation.h"
+#include "engine/normals/rest_surface.h"
 
 namespace pointwright {
 namespace {
 
 // Closer scales would ask for a base of a grid much finer than the level that it smooths.
 constexpr float kGreatestScaleRatio = 0.95F;
-
-// Uploaded normals, made unit; estimated ones where an uploaded one is no direction.
-Points adopt_normals(const Points& uploaded, const Points& estimated) {
-  Points result(uploaded.size());
-  parallel_for(uploaded.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Vec3f n = uploaded[i];
-      const float length = n.norm();
-      const bool usable = std::isfinite(length) && length > 1e-6F;
-      const bool is_unit = std::abs(length - 1.0F) < 1e-5F;  // keeps the bits of what is unit already
-      result.set(i, !usable ? estimated[i] : is_unit ? n : Vec3f(n / length));
-    }
-  });
-  return result;
-}
 
 // One band: fills `below` with the base level of `above` and returns its detail coefficients.
 Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origin, float scale, float spacing,
@@ -91,22 +75,12 @@ Result<void> validate(const HierarchyParams& params) {
                    .actual = static_cast<double>(scale)};
     }
   }
-  if (params.neighbors < 4 || params.neighbors > 32) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "neighbors must lie between 4 and 32",
-                 .field = "neighbors",
-                 .limit = 32,
-                 .actual = static_cast<double>(params.neighbors)};
-  }
-  return {};
+  return validate_neighbors(params.neighbors);
 }
 
 Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& params,
                                   const ExecutionContext& context) {
   if (const auto valid = validate(params); !valid) return valid.error();
-  if (cloud.size() == 0) {
-    return Error{.code = ErrorCode::kEmptyCloud, .message = "the cloud has no samples", .field = "cloud"};
-  }
   Hierarchy result;
   const std::size_t bands = params.scales.size();
   result.surface.levels.resize(bands + 1);
@@ -114,21 +88,12 @@ Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& par
   result.reports.resize(bands);
   Level& finest = result.surface.levels.back();
   finest.position = cloud.position;
-
-  context.begin_phase("neighbours", 0.0);
-  result.graph = build_neighbor_graph(cloud.position, params.neighbors, &context);
-  if (context.is_cancelled()) return cancelled_error();
+  auto rest = rest_surface(cloud, params.neighbors, context);
+  if (!rest) return rest.error();
+  result.graph = std::move(rest.value().graph);
+  result.component_count = rest.value().component_count;
+  finest.normal = std::move(rest.value().normal);
   result.spacing = local_spacing(cloud.position, result.graph);
-
-  context.begin_phase("normals", 0.35);
-  estimate_normals(cloud.position, result.graph, NormalParams{}, finest.normal, &context);
-  if (context.is_cancelled()) return cancelled_error();
-  if (cloud.has_normals()) {
-    finest.normal = adopt_normals(cloud.normal, finest.normal);
-  } else {
-    result.component_count = orient_normals(cloud.position, result.graph, finest.normal, &context).components;
-  }
-  if (context.is_cancelled()) return cancelled_error();
 
   const float diagonal = bounds_of(cloud.position).diagonal();
   const float spacing = median(result.spacing);

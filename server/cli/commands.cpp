@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "protocol/json/documents.h"
+#include "server/cli/geometry_commands.h"
 #include "server/cli/local_file.h"
 #include "server/ingest/files.h"
 
@@ -13,6 +14,8 @@ namespace {
 constexpr std::uint64_t kDefaultMaxMebibytes = 16 * 1024;
 
 struct Options {
+  SmoothOptions smooth;
+  SimplifyOptions simplify;
   std::string input;
   std::string output;
   int draco_bits = 0;
@@ -32,25 +35,59 @@ Result<ImportedCloud> read_input(const Options& options) {
                           options.max_mebibytes << 20U);
 }
 
-int convert(const Options& options, std::ostream& err) {
+/// Writes the cloud into options.output, in the format that its name asks for.
+int write_output(const Cloud& cloud, const Options& options, std::ostream& err) {
   const auto format = format_of_name(options.output);
   if (!format) return fail(err, options.output, format.error());
-  if (options.draco_bits != 0 && format.value() != CloudFormat::kDraco) {
-    err << "pointwright: --draco-bits is for .drc files\n";
-    return 2;
-  }
-  if (options.ascii && format.value() != CloudFormat::kPly) {
-    err << "pointwright: --ascii is for .ply files\n";
-    return 2;
-  }
-  const auto imported = read_input(options);
-  if (!imported) return fail(err, options.input, imported.error());
-  const auto bytes = write_cloud(imported.value().cloud, format.value(),
-                                 {.ascii = options.ascii, .draco_position_bits = options.draco_bits});
+  const auto bytes =
+      write_cloud(cloud, format.value(), {.ascii = options.ascii, .draco_position_bits = options.draco_bits});
   if (!bytes) return fail(err, options.output, bytes.error());
   if (const auto written = write_file_atomically(options.output, bytes.value()); !written)
     return fail(err, options.output, written.error());
   return 0;
+}
+
+/// Whether the output options fit the output; says so where not.
+bool fits_output(const Options& options, std::ostream& err, int& status) {
+  const auto format = format_of_name(options.output);
+  if (!format) {
+    status = fail(err, options.output, format.error());
+    return false;
+  }
+  const char* complaint = nullptr;
+  if (options.draco_bits != 0 && format.value() != CloudFormat::kDraco)
+    complaint = "--draco-bits is for .drc files";
+  else if (options.ascii && format.value() != CloudFormat::kPly)
+    complaint = "--ascii is for .ply files";
+  if (complaint == nullptr) return true;
+  err << "pointwright: " << complaint << "\n";
+  status = 2;
+  return false;
+}
+
+/// Reads the input, changes it, writes the output. `change` is Cloud -> Result<Cloud>, with a line to print.
+template <typename Change>
+int rewrite(const Options& options, std::ostream& out, std::ostream& err, Change change) {
+  int status = 0;
+  if (!fits_output(options, err, status)) return status;
+  auto imported = read_input(options);
+  if (!imported) return fail(err, options.input, imported.error());
+  std::string report;
+  const auto changed = change(std::move(imported).value().cloud, report);
+  if (!changed) {
+    const Error& error = changed.error();
+    err << "pointwright: " << (error.field.empty() ? options.input : "--" + error.field) << ": "
+        << error.message << "\n";
+    return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
+  }
+  if (const int failed = write_output(changed.value(), options, err); failed != 0) return failed;
+  if (!report.empty()) out << report << "\n";
+  return 0;
+}
+
+int convert(const Options& options, std::ostream& out, std::ostream& err) {
+  return rewrite(options, out, err,
+                 [](Cloud cloud, std::string&) { return Result<Cloud>(std::move(cloud)); });
 }
 
 int info(const Options& options, std::ostream& out, std::ostream& err) {
@@ -84,6 +121,32 @@ int info(const Options& options, std::ostream& out, std::ostream& err) {
   return 0;
 }
 
+CLI::App* add_smooth(CLI::App& app, SmoothOptions& options) {
+  CLI::App* const command = app.add_subcommand("smooth", "smooth a surface; its detail is gone");
+  command->add_option("--scale", options.scale,
+                      "to a scale: a fraction of the bounding box's diagonal, up to 0.2");
+  command->add_option("--iterations", options.iterations, "or by so many umbrella steps")
+      ->check(CLI::Range(1, 100'000));
+  command
+      ->add_option("--preserve", options.preserve,
+                   "volume: none, local, global (closed surfaces), taubin (with --iterations)")
+      ->capture_default_str();
+  command->add_option("--neighbors", options.neighbors, "of a sample's neighbourhood, 4 to 32")
+      ->capture_default_str();
+  return command;
+}
+
+CLI::App* add_simplify(CLI::App& app, SimplifyOptions& options) {
+  CLI::App* const command =
+      app.add_subcommand("simplify", "keep fewer samples, where the surface needs them, with all attributes");
+  command->add_option("--count", options.count, "samples to keep");
+  command->add_option("--ratio", options.ratio, "or the part of them to keep, up to 1");
+  command->add_option("--error", options.error, "or how far off the surface, as a fraction of the diagonal");
+  command->add_option("--neighbors", options.neighbors, "of a sample's neighbourhood, 4 to 32")
+      ->capture_default_str();
+  return command;
+}
+
 }  // namespace
 
 int run_command(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
@@ -93,18 +156,22 @@ int run_command(const std::vector<std::string>& arguments, std::ostream& out, st
   Options options;
   CLI::App* const convert_command =
       app.add_subcommand("convert", "write a cloud in another format, with all attributes");
-  convert_command->add_option("IN", options.input, "Draco, PLY or XYZ file, gzip-compressed or not")
-      ->required();
-  convert_command->add_option("OUT", options.output, ".drc, .ply, .xyz, .txt or .asc")->required();
-  convert_command
-      ->add_option("--draco-bits", options.draco_bits, "quantise positions to so many bits; lossless without")
-      ->check(CLI::Range(8, 30));
-  convert_command->add_flag("--ascii", options.ascii, "PLY as text");
+  CLI::App* const smooth_command = add_smooth(app, options.smooth);
+  CLI::App* const simplify_command = add_simplify(app, options.simplify);
+  for (CLI::App* const command : {convert_command, smooth_command, simplify_command}) {
+    command->add_option("IN", options.input, "Draco, PLY or XYZ file, gzip-compressed or not")->required();
+    command->add_option("OUT", options.output, ".drc, .ply, .xyz, .txt or .asc")->required();
+    command
+        ->add_option("--draco-bits", options.draco_bits,
+                     "quantise positions to so many bits; lossless without")
+        ->check(CLI::Range(8, 30));
+    command->add_flag("--ascii", options.ascii, "PLY as text");
+  }
   CLI::App* const info_command = app.add_subcommand("info", "tell what a file holds");
   info_command->add_option("FILE", options.input, "Draco, PLY or XYZ file, gzip-compressed or not")
       ->required();
   info_command->add_flag("--json", options.json, "as a JSON document");
-  for (CLI::App* const command : {convert_command, info_command}) {
+  for (CLI::App* const command : {convert_command, info_command, smooth_command, simplify_command}) {
     command->add_flag("--drop-non-finite", options.drop_non_finite, "leave out samples that are not finite");
     command->add_option("--max-mebibytes", options.max_mebibytes, "largest file to read, inflated")
         ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 30U))
@@ -117,7 +184,16 @@ int run_command(const std::vector<std::string>& arguments, std::ostream& out, st
     return app.exit(error, out, err) == 0 ? 0 : 2;
   }
   try {
-    return convert_command->parsed() ? convert(options, err) : info(options, out, err);
+    if (convert_command->parsed()) return convert(options, out, err);
+    if (smooth_command->parsed())
+      return rewrite(options, out, err, [&](const Cloud& cloud, std::string& report) {
+        return smoothed(cloud, options.smooth, report);
+      });
+    if (simplify_command->parsed())
+      return rewrite(options, out, err, [&](const Cloud& cloud, std::string& report) {
+        return simplified(cloud, options.simplify, report);
+      });
+    return info(options, out, err);
   } catch (const std::bad_alloc&) {
     err << "pointwright: not enough memory\n";
     return 1;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/core/parallel.h"
+#include "engine/core/moved_cloud.h"
 #include "server/sessions/session.h"
 
 namespace pointwright::server {
@@ -184,19 +184,7 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
 
 std::shared_ptr<const Cloud> Session::edited_cloud(const Picture& picture, std::uint32_t level) const {
   const Level& now = picture.surface->levels[level];
-  auto cloud = std::make_shared<Cloud>(*params_.cloud);
-  parallel_for(cloud->size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      // What no edit moved leaves with the very bits it came with.
-      if (!cloud->exact_position.empty() && now.position[i] != params_.cloud->position[i]) {
-        const Vec3d place = cloud->origin + now.position[i].cast<double>();
-        cloud->exact_position[i] = {place.x(), place.y(), place.z()};
-      }
-    }
-  });
-  cloud->position = now.position;
-  cloud->normal = now.normal;
-  return cloud;
+  return std::make_shared<const Cloud>(moved_cloud(*params_.cloud, now.position, now.normal));
 }
 
 std::uint16_t Session::available_attributes(std::uint16_t asked) const {

@@ -136,8 +136,9 @@ TEST_CASE("mutated files are accepted whole or refused, and the daemon lives") {
     CHECK(reply.status != 0);
     CHECK(reply.status < 500);
     if (reply.status == 201) {
-      for (const auto& coordinate : reply.json()["bounds"]["min"]) CHECK(coordinate.is_number());
-      CHECK(daemon.ask("DELETE", "/v1/clouds/" + reply.json()["id"].get<std::string>()).status == 204);
+      const auto document = reply.json();
+      for (const auto& coordinate : document["bounds"]["min"]) CHECK(coordinate.is_number());
+      CHECK(daemon.ask("DELETE", "/v1/clouds/" + document["id"].get<std::string>()).status == 204);
     }
   }
   CHECK(daemon.is_alive());

@@ -154,6 +154,55 @@ TEST_CASE("info tells what a file holds, for people and as a document") {
   CHECK(run({POINTWRIGHT_PATH, "info", ply}).out.find("samples     400") != std::string::npos);
 }
 
+TEST_CASE("simplify keeps what it is told to, with the attributes, and smooth keeps all but the detail") {
+  const TemporaryFolder folder;
+  const std::string ply = sheet_file(folder, CloudFormat::kPly, "sheet.ply");
+  const auto document = [&](const std::string& file) {
+    return nlohmann::json::parse(run({POINTWRIGHT_PATH, "info", file, "--json"}).out);
+  };
+  CHECK(run({POINTWRIGHT_PATH, "simplify", ply, folder / "count.ply", "--count", "150"}).out ==
+        "400 samples to 150\n");
+  CHECK(document(folder / "count.ply")["sample_count"] == 150);
+  // The normals that it was simplified with come along.
+  CHECK(document(folder / "count.ply")["report"]["attributes"] == nlohmann::json{"normal", "color"});
+  CHECK(run({POINTWRIGHT_PATH, "simplify", ply, folder / "ratio.drc", "--ratio", "0.25"}).status == 0);
+  CHECK(document(folder / "ratio.drc")["sample_count"] == 100);
+  CHECK(run({POINTWRIGHT_PATH, "simplify", ply, folder / "error.ply", "--error", "0.01"}).status == 0);
+  CHECK(document(folder / "error.ply")["sample_count"] < 400);
+  CHECK(run({POINTWRIGHT_PATH, "smooth", ply, folder / "smooth.ply", "--scale", "0.1"}).status == 0);
+  CHECK(document(folder / "smooth.ply")["sample_count"] == 400);
+  const auto height = [&](const std::string& file) {
+    const auto bounds = document(file)["bounds"];
+    return bounds["max"][2].get<double>() - bounds["min"][2].get<double>();
+  };
+  CHECK(height(folder / "smooth.ply") < 0.8 * height(ply));
+  CHECK(
+      run({POINTWRIGHT_PATH, "smooth", ply, folder / "steps.ply", "--iterations", "5", "--preserve", "local"})
+          .status == 0);
+  CHECK(height(folder / "steps.ply") > height(folder / "smooth.ply"));
+
+  for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+           {"smooth"},
+           {"smooth", "--scale", "0.1", "--iterations", "3"},
+           {"smooth", "--scale", "0.3"},
+           {"smooth", "--scale", "0.1", "--preserve", "much"},
+           {"smooth", "--scale", "0.1", "--preserve", "taubin"},
+           {"smooth", "--iterations", "3", "--preserve", "global"},  // a sheet has no volume
+           {"smooth", "--iterations", "0"},
+           {"simplify"},
+           {"simplify", "--count", "10", "--ratio", "0.5"},
+           {"simplify", "--count", "0"},
+           {"simplify", "--ratio", "1.5"},
+           {"simplify", "--ratio", "0.5", "--neighbors", "40"}}) {
+    std::vector<std::string> command{POINTWRIGHT_PATH, wrong[0], ply, folder / "none.ply"};
+    command.insert(command.end(), wrong.begin() + 1, wrong.end());
+    const Ended ended = run(command);
+    CHECK(ended.status == 2);
+    CHECK_FALSE(ended.err.empty());
+    CHECK_FALSE(std::filesystem::exists(folder / "none.ply"));
+  }
+}
+
 TEST_CASE("the tool's mistakes have exit statuses and sentences") {
   const TemporaryFolder folder;
   const std::string ply = sheet_file(folder, CloudFormat::kPly, "sheet.ply");
