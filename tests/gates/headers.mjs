@@ -19,7 +19,9 @@ const cache = resolve(root, "build/checks/headers");
 /** The flags of a source in the header's folder, else of the nearest folder above that has one. */
 function flagsFor(header, flags) {
   for (let folder = dirname(header); ; folder = dirname(folder)) {
-    const source = [...flags.keys()].find((path) => folder === "." || path.startsWith(`${folder}/`));
+    const source = [...flags.keys()].find(
+      (path) => (folder === "." || path.startsWith(`${folder}/`)) && flags.get(path).includes(`-I${root}`),
+    );
     if (source) return flags.get(source);
     if (folder === ".") throw new Error("the release build has no sources");
   }
