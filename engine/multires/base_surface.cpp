@@ -11,6 +11,7 @@
 #include "engine/normals/estimation.h"
 #include "engine/smoothing/umbrella.h"
 #include "engine/spatial/coherent_order.h"
+#include "engine/spatial/same_side_graph.h"
 
 namespace pointwright {
 namespace {
@@ -235,27 +236,6 @@ void gather_cells(const Points& position, const Points& normal, const Grid& grid
   for (std::uint32_t& q : base.counterpart) q = rank[part_of[q]];
 }
 
-// The nearest kCachedNeighbors on the same side: neither smoothing nor projection may join opposite sheets.
-// Short rows are filled with the sample itself.
-NeighborGraph same_side_graph(const Points& position, const Points& normal, const ExecutionContext& context) {
-  const NeighborGraph all = build_neighbor_graph(position, 2 * kCachedNeighbors, &context);
-  NeighborGraph graph;
-  graph.count = all.count;
-  graph.k = std::min(kCachedNeighbors, all.k);
-  graph.lanes.assign(padded_to_block(graph.count) * graph.k, 0U);
-  parallel_for(graph.count, [&](std::size_t begin, std::size_t end) {
-    for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
-      std::uint32_t count = 0;
-      for (std::uint32_t j = 0; j < all.k && count < graph.k; ++j) {
-        const std::uint32_t q = all.index(i, j);
-        if (normal[i].dot(normal[q]) > 0.0F) graph.index(i, count++) = q;
-      }
-      while (count < graph.k) graph.index(i, count++) = i;
-    }
-  });
-  return graph;
-}
-
 // The first k columns of a graph.
 NeighborGraph narrowed(const NeighborGraph& graph, std::uint32_t k) {
   NeighborGraph result;
@@ -324,7 +304,7 @@ Result<BaseSurface> build_base_surface(const Points& position, const Points& nor
   const double cell = kCellOfScale * static_cast<double>(scale);
   BaseSurface base;
   gather_cells(position, normal, sort_into_cells(position, origin, cell), cell, base);
-  base.graph = same_side_graph(base.position, base.normal, context);
+  base.graph = same_side_graph(base.position, base.normal, kCachedNeighbors, 2 * kCachedNeighbors, &context);
   if (context.is_cancelled()) return cancelled_error();
 
   // Variances add: the cells and the least-squares planes have theirs, the umbrella supplies the rest of
@@ -343,7 +323,8 @@ Result<BaseSurface> build_base_surface(const Points& position, const Points& nor
     base.iterations = smoothed.value().iterations;
     base.position = std::move(smoothed).value().points;
     refit_normals(base.position, smoothing_graph, base.normal);
-    base.graph = same_side_graph(base.position, base.normal, context);
+    base.graph =
+        same_side_graph(base.position, base.normal, kCachedNeighbors, 2 * kCachedNeighbors, &context);
     if (context.is_cancelled()) return cancelled_error();
   } else {
     refit_normals(base.position, smoothing_graph, base.normal);

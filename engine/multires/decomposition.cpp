@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/normals/plane_fit.h"
 
@@ -190,11 +191,7 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
                                 float spacing, const DecomposeParams& params,
                                 const ExecutionContext& context) {
   if (!(params.sigma > 0.0F && params.sigma <= 100.0F)) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "sigma must lie in (0, 100]",
-                 .field = "sigma",
-                 .limit = 100.0,
-                 .actual = static_cast<double>(params.sigma)};
+    return out_of_range("sigma must lie in (0, 100]", "sigma", 100.0, static_cast<double>(params.sigma));
   }
   const std::size_t n = position.size();
   Decomposition result;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/core/median.h"
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/multires/base_surface.h"
 #include "engine/multires/decomposition.h"
@@ -52,27 +53,19 @@ Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origi
 
 Result<void> validate(const HierarchyParams& params) {
   if (params.scales.empty() || params.scales.size() > kMaxBands) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "a hierarchy has 1 to " + std::to_string(kMaxBands) + " bands",
-                 .field = "scales",
-                 .limit = static_cast<double>(kMaxBands),
-                 .actual = static_cast<double>(params.scales.size())};
+    return out_of_range("a hierarchy has 1 to " + std::to_string(kMaxBands) + " bands", "scales",
+                        static_cast<double>(kMaxBands), static_cast<double>(params.scales.size()));
   }
   for (std::size_t level = 0; level < params.scales.size(); ++level) {
     const float scale = params.scales[level];
     if (!(scale >= 1e-4F && scale <= 0.2F)) {
-      return Error{.code = ErrorCode::kInvalidArgument,
-                   .message = "a scale is a fraction of the bounding-box diagonal between 0.0001 and 0.2",
-                   .field = "scales",
-                   .limit = 0.2,
-                   .actual = static_cast<double>(scale)};
+      return out_of_range("a scale is a fraction of the bounding-box diagonal between 0.0001 and 0.2",
+                          "scales", 0.2, static_cast<double>(scale));
     }
     if (level > 0 && !(scale <= kGreatestScaleRatio * params.scales[level - 1])) {
-      return Error{.code = ErrorCode::kInvalidArgument,
-                   .message = "scales descend: each is at most 0.95 of the one before",
-                   .field = "scales",
-                   .limit = static_cast<double>(kGreatestScaleRatio * params.scales[level - 1]),
-                   .actual = static_cast<double>(scale)};
+      return out_of_range("scales descend: each is at most 0.95 of the one before", "scales",
+                          static_cast<double>(kGreatestScaleRatio * params.scales[level - 1]),
+                          static_cast<double>(scale));
     }
   }
   return validate_neighbors(params.neighbors);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "engine/core/check.h"
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/multires/carried_normals_kernels.h"
 #include "engine/normals/estimation.h"
@@ -67,24 +68,17 @@ void carry(const MultiresSurface& rest, std::size_t k, const NeighborGraph& grap
 }  // namespace
 
 Result<void> validate(const ReconstructParams& params, const MultiresSurface& surface) {
-  const auto refuse = [](std::string message, const char* field, double limit, double actual) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = std::move(message),
-                 .field = field,
-                 .limit = limit,
-                 .actual = actual};
-  };
   const std::size_t bands = surface.band_count();
   if (params.level > bands)
-    return refuse("the surface has no such level", "level", static_cast<double>(bands),
-                  static_cast<double>(params.level));
+    return out_of_range("the surface has no such level", "level", static_cast<double>(bands),
+                        static_cast<double>(params.level));
   if (!params.gains.empty() && params.gains.size() != bands)
-    return refuse("there is one gain for each band", "gains", static_cast<double>(bands),
-                  static_cast<double>(params.gains.size()));
+    return out_of_range("there is one gain for each band", "gains", static_cast<double>(bands),
+                        static_cast<double>(params.gains.size()));
   for (const float gain : params.gains) {
     if (!(gain >= -kGreatestGain && gain <= kGreatestGain))
-      return refuse("a gain lies within -16 and 16", "gains", static_cast<double>(kGreatestGain),
-                    static_cast<double>(gain));
+      return out_of_range("a gain lies within -16 and 16", "gains", static_cast<double>(kGreatestGain),
+                          static_cast<double>(gain));
   }
   return {};
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/normals/estimation.h"
 #include "engine/normals/orientation.h"
@@ -28,11 +29,8 @@ Points adopt_normals(const Points& uploaded, const Points& estimated) {
 
 Result<void> validate_neighbors(std::uint32_t neighbors) {
   if (neighbors < 4 || neighbors > 32) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "neighbors must lie between 4 and 32",
-                 .field = "neighbors",
-                 .limit = 32,
-                 .actual = static_cast<double>(neighbors)};
+    return out_of_range("neighbors must lie between 4 and 32", "neighbors", 32,
+                        static_cast<double>(neighbors));
   }
   return {};
 }

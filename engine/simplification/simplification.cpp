@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/simplification/contraction.h"
 
@@ -116,32 +117,24 @@ void apply_record(const Points& position, const Points& normal, Simplification& 
   if (result.placement == Placement::kOnSurface && !record.steps.empty()) settle(position, normal, result);
 }
 
-Error invalid(const char* message, const char* field, double limit, double actual) {
-  return {.code = ErrorCode::kInvalidArgument,
-          .message = message,
-          .field = field,
-          .limit = limit,
-          .actual = actual};
-}
-
 }  // namespace
 
 Result<void> validate(const SimplifyParams& params) {
   if (const auto* keep = std::get_if<KeepCount>(&params.target); keep != nullptr && keep->count < 1) {
-    return invalid("at least one sample must be kept", "target.count", 1, 0);
+    return out_of_range("at least one sample must be kept", "target.count", 1, 0);
   }
   if (const auto* keep = std::get_if<KeepRatio>(&params.target);
       keep != nullptr && !(keep->ratio > 0.0 && keep->ratio <= 1.0)) {
-    return invalid("the ratio must lie in (0, 1]", "target.ratio", 1, keep->ratio);
+    return out_of_range("the ratio must lie in (0, 1]", "target.ratio", 1, keep->ratio);
   }
   if (const auto* keep = std::get_if<KeepWithin>(&params.target);
       keep != nullptr && !(keep->error >= 0.0F && std::isfinite(keep->error))) {
-    return invalid("the error must be finite and not negative", "target.error", 0,
-                   static_cast<double>(keep->error));
+    return out_of_range("the error must be finite and not negative", "target.error", 0,
+                        static_cast<double>(keep->error));
   }
   if (!(params.length_weight >= 0.0F && params.length_weight <= kMaxLengthWeight)) {
-    return invalid("length_weight must lie between 0 and 10", "length_weight",
-                   static_cast<double>(kMaxLengthWeight), static_cast<double>(params.length_weight));
+    return out_of_range("length_weight must lie between 0 and 10", "length_weight",
+                        static_cast<double>(kMaxLengthWeight), static_cast<double>(params.length_weight));
   }
   return {};
 }

@@ -4,6 +4,7 @@
 #include "engine/core/parallel.h"
 #include "engine/normals/estimation.h"
 #include "engine/smoothing/kernel_variance.h"
+#include "engine/smoothing/ranges.h"
 #include "engine/smoothing/umbrella.h"
 #include "engine/smoothing/umbrella_steps.h"
 
@@ -19,11 +20,7 @@ constexpr double kExhausted = 0.01;
 Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& normals,
                                         const NeighborGraph& graph, float scale, SmoothingDirection direction,
                                         std::uint32_t max_iterations, const ExecutionContext* context) {
-  if (!std::isfinite(scale) || scale < 0.0F) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "the smoothing scale must be finite and not negative",
-                 .field = "scale"};
-  }
+  if (const auto valid = validate_scale(scale); !valid) return valid.error();
   POINTWRIGHT_CHECK(graph.count == points.size(), "the graph must be of these points");
   const bool is_free = direction == SmoothingDirection::kFree;
   POINTWRIGHT_CHECK(is_free || normals.size() == points.size(), "smoothing along the normals needs them");

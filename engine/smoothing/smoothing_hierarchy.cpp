@@ -13,6 +13,8 @@
 #include "engine/core/median.h"
 #include "engine/core/parallel.h"
 #include "engine/smoothing/kernel_variance.h"
+#include "engine/smoothing/ranges.h"
+#include "engine/spatial/same_side_graph.h"
 
 namespace pointwright {
 namespace {
@@ -71,25 +73,6 @@ LevelMeasure measured(const Points& points, const NeighborGraph& graph, std::uin
     before = now;
   }
   return result;
-}
-
-NeighborGraph same_side_graph(const Points& position, const Points& normal, const ExecutionContext* context) {
-  const NeighborGraph all = build_neighbor_graph(position, kCandidates, context);
-  NeighborGraph graph;
-  graph.count = all.count;
-  graph.k = std::min(kNeighbors, all.k);
-  graph.lanes.assign(padded_to_block(graph.count) * graph.k, 0U);
-  parallel_for(graph.count, [&](std::size_t begin, std::size_t end) {
-    for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
-      std::uint32_t count = 0;
-      for (std::uint32_t j = 0; j < all.k && count < graph.k; ++j) {
-        const std::uint32_t other = all.index(i, j);
-        if (normal[i].dot(normal[other]) > 0.0F) graph.index(i, count++) = other;
-      }
-      while (count < graph.k) graph.index(i, count++) = i;
-    }
-  });
-  return graph;
 }
 
 // Children of each coarse sample.
@@ -328,11 +311,7 @@ Result<SmoothingHierarchy> build_smoothing_hierarchy(const Points& points, const
                                                      const NeighborGraph& graph, float scale,
                                                      const Coarsener& coarsen,
                                                      const ExecutionContext* context) {
-  if (!std::isfinite(scale) || scale < 0.0F) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "the smoothing scale must be finite and not negative",
-                 .field = "scale"};
-  }
+  if (const auto valid = validate_scale(scale); !valid) return valid.error();
   POINTWRIGHT_CHECK(graph.count == points.size() && normals.size() == points.size(),
                     "the graph and the normals must be of these points");
   const auto is_cancelled = [&] { return context != nullptr && context->is_cancelled(); };
@@ -358,7 +337,7 @@ Result<SmoothingHierarchy> build_smoothing_hierarchy(const Points& points, const
     link_children(*position, level);
     settle(*position, *neighbors, level);
     set_offsets(*position, level);
-    level.graph = same_side_graph(level.position, level.normal, context);
+    level.graph = same_side_graph(level.position, level.normal, kNeighbors, kCandidates, context);
     if (is_cancelled()) return cancelled_error();
     level.listers = reverse_neighbors(level.graph);
     set_up_weights(*position, level);

@@ -9,8 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/smoothing/global_volume.h"
+#include "engine/smoothing/ranges.h"
 #include "engine/smoothing/umbrella_steps.h"
 
 namespace pointwright {
@@ -35,14 +37,6 @@ std::vector<float> rest_weights(const Points& points, const NeighborGraph& graph
   return weights;
 }
 
-Error out_of_range(const char* field, const char* message, double limit, double actual) {
-  return Error{.code = ErrorCode::kInvalidArgument,
-               .message = message,
-               .field = field,
-               .limit = limit,
-               .actual = actual};
-}
-
 }  // namespace
 
 float taubin_mu(float lambda, float pass_band) {
@@ -50,15 +44,13 @@ float taubin_mu(float lambda, float pass_band) {
 }
 
 Result<void> validate(const UmbrellaParams& params) {
-  if (!(params.lambda > 0.0F && params.lambda <= 0.7F)) {
-    return out_of_range("lambda", "lambda must lie in (0, 0.7]", 0.7, static_cast<double>(params.lambda));
-  }
+  if (const auto valid = validate_lambda(params.lambda); !valid) return valid;
   if (params.iterations > 100'000) {
-    return out_of_range("iterations", "at most 100,000 iterations", 100'000,
+    return out_of_range("at most 100,000 iterations", "iterations", 100'000,
                         static_cast<double>(params.iterations));
   }
   if (!(params.pass_band > 0.0F && params.pass_band <= 0.2F)) {
-    return out_of_range("pass_band", "the pass-band frequency must lie in (0, 0.2]", 0.2,
+    return out_of_range("the pass-band frequency must lie in (0, 0.2]", "pass_band", 0.2,
                         static_cast<double>(params.pass_band));
   }
   if (params.preserve == VolumePreservation::kTaubin) {
@@ -66,7 +58,7 @@ Result<void> validate(const UmbrellaParams& params) {
     const double mu = static_cast<double>(taubin_mu(params.lambda, params.pass_band));
     const double highest = (1.0 - 2.0 * static_cast<double>(params.lambda)) * (1.0 - 2.0 * mu);
     if (std::abs(highest) > 1.0) {
-      return out_of_range("lambda", "Taubin's steps diverge with this lambda and pass-band frequency", 1.0,
+      return out_of_range("Taubin's steps diverge with this lambda and pass-band frequency", "lambda", 1.0,
                           std::abs(highest));
     }
   }

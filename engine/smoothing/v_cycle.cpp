@@ -8,9 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/normals/estimation.h"
 #include "engine/smoothing/global_volume.h"
+#include "engine/smoothing/ranges.h"
 #include "engine/smoothing/umbrella_steps.h"
 
 namespace pointwright {
@@ -194,31 +196,17 @@ Points moved_along_normals(const Points& points, const Points& smoothed, const N
   return result;
 }
 
-Error out_of_range(const char* field, const char* message, double limit, double actual) {
-  return Error{.code = ErrorCode::kInvalidArgument,
-               .message = message,
-               .field = field,
-               .limit = limit,
-               .actual = actual};
-}
-
 }  // namespace
 
 Result<void> validate(const VCycleParams& params) {
-  if (!std::isfinite(params.scale) || params.scale < 0.0F) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "the smoothing scale must be finite and not negative",
-                 .field = "scale"};
-  }
-  if (!(params.lambda > 0.0F && params.lambda <= 0.7F)) {
-    return out_of_range("lambda", "lambda must lie in (0, 0.7]", 0.7, static_cast<double>(params.lambda));
-  }
+  if (const auto valid = validate_scale(params.scale); !valid) return valid;
+  if (const auto valid = validate_lambda(params.lambda); !valid) return valid;
   if (params.pre_iterations > 100) {
-    return out_of_range("pre_iterations", "at most 100 iterations on the way down", 100,
+    return out_of_range("at most 100 iterations on the way down", "pre_iterations", 100,
                         params.pre_iterations);
   }
   if (params.post_iterations > 100) {
-    return out_of_range("post_iterations", "at most 100 iterations on the way up", 100,
+    return out_of_range("at most 100 iterations on the way up", "post_iterations", 100,
                         params.post_iterations);
   }
   if (params.preserve == VolumePreservation::kTaubin) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/spatial/block_tree.h"
 #include "engine/spatial/distinct_points.h"
@@ -21,19 +22,12 @@ struct Part {
 
 Result<void> validate(const RadiusParams& params) {
   if (!(params.radius > 0.0F) || !std::isfinite(params.radius)) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "a radius is a finite distance above 0",
-                 .field = "radius",
-                 .limit = 0.0,
-                 .actual = static_cast<double>(params.radius)};
+    return out_of_range("a radius is a finite distance above 0", "radius", 0.0,
+                        static_cast<double>(params.radius));
   }
   if (params.limit < 1 || params.limit > kMaxRadiusNeighbors) {
-    return Error{
-        .code = ErrorCode::kInvalidArgument,
-        .message = "the limit of neighbours lies between 1 and " + std::to_string(kMaxRadiusNeighbors),
-        .field = "limit",
-        .limit = static_cast<double>(kMaxRadiusNeighbors),
-        .actual = static_cast<double>(params.limit)};
+    return out_of_range("the limit of neighbours lies between 1 and " + std::to_string(kMaxRadiusNeighbors),
+                        "limit", static_cast<double>(kMaxRadiusNeighbors), static_cast<double>(params.limit));
   }
   return {};
 }

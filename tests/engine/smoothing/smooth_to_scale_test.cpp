@@ -10,6 +10,7 @@
 #include "engine/core/parallel.h"
 #include "engine/smoothing/umbrella.h"
 #include "tests/support/surfaces.h"
+#include "tests/support/wave_amplitude.h"
 
 namespace pointwright {
 namespace {
@@ -18,20 +19,6 @@ using namespace test;
 
 constexpr double kTau = 6.283185307179586;
 constexpr std::uint32_t kPlenty = 10'000;  // iterations: more than any scale here needs
-
-// Amplitude of sin(2 pi x / wavelength) in the heights, by least squares, without a margin along the border.
-double amplitude(const Points& points, double wavelength, double half, double margin) {
-  double product = 0.0;
-  double square = 0.0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3d p = points[i].cast<double>();
-    if (std::abs(p.x()) > half - margin || std::abs(p.y()) > half - margin) continue;
-    const double wave_here = std::sin(kTau * p.x() / wavelength);
-    product += wave_here * p.z();
-    square += wave_here * wave_here;
-  }
-  return product / square;
-}
 
 struct Run {
   double attenuation;
@@ -48,7 +35,7 @@ Run attenuate(Sampling sampling, double spacing, double wavelength, double scale
                                 static_cast<float>(scale), direction, kPlenty);
   REQUIRE(result.ok());
   CHECK(relative_error(static_cast<double>(result.value().scale), scale) < 0.001);
-  return {amplitude(result.value().points, wavelength, kWidth / 2, 4.0 * scale) / height,
+  return {wave_amplitude(result.value().points, wavelength, kWidth / 2, 4.0 * scale) / height,
           result.value().iterations};
 }
 
@@ -122,7 +109,7 @@ TEST_CASE("the kernel variance predicts a wave's attenuation on a gradient of de
                           kScale, direction, kPlenty);
       REQUIRE(result.ok());
       const double left =
-          amplitude(result.value().points, wavelength, kWidth / 2, 4.0 * kScale) / (0.01 * wavelength);
+          wave_amplitude(result.value().points, wavelength, kWidth / 2, 4.0 * kScale) / (0.01 * wavelength);
       MESSAGE("wavelength " << wavelength << ": " << left << ", effective scale "
                             << effective_scale(left, wavelength) / kScale);
       CHECK(relative_error(effective_scale(left, wavelength), kScale) < 0.1);

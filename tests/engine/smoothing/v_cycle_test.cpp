@@ -15,6 +15,7 @@
 #include "engine/spatial/kd_tree.h"
 #include "tests/support/surfaces.h"
 #include "tests/support/voxel_coarsener.h"
+#include "tests/support/wave_amplitude.h"
 
 namespace pointwright {
 namespace {
@@ -43,20 +44,6 @@ VCycle cycle(const Rest& rest, const VCycleParams& params) {
   auto result = v_cycle(rest.surface.position, rest.surface.normal, rest.graph, rest.hierarchy, params);
   REQUIRE(result.ok());
   return std::move(result).value();
-}
-
-// Amplitude of sin(2 pi x / wavelength) in the heights, by least squares, without a margin along the border.
-double amplitude(const Points& points, double wavelength, double half, double margin) {
-  double product = 0.0;
-  double square = 0.0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3d p = points[i].cast<double>();
-    if (std::abs(p.x()) > half - margin || std::abs(p.y()) > half - margin) continue;
-    const double here = std::sin(kTau * p.x() / wavelength);
-    product += here * p.z();
-    square += here * here;
-  }
-  return product / square;
 }
 
 // Nearest-neighbour distance at the first percentile.
@@ -102,7 +89,7 @@ TEST_CASE("the V-cycle takes waves down as the scale says, the shorter the more"
           const VCycle smoothed = cycle(rest, {.scale = static_cast<float>(scale), .preserve = preserve});
           CHECK(smoothed.depth >= 1);
           CHECK(relative_error(static_cast<double>(smoothed.scale), scale) < 0.01);
-          const double left = amplitude(smoothed.points, wavelength, 0.5 * kSide, 4.0 * scale) / height;
+          const double left = wave_amplitude(smoothed.points, wavelength, 0.5 * kSide, 4.0 * scale) / height;
           if (!table.empty()) CHECK(left > table.back().second);
           table.emplace_back(ratio, left);
           if (is_plain && ratio > 2.0) {
@@ -134,7 +121,7 @@ TEST_CASE("over contracted levels, an octave each, waves go down as the scale sa
       CHECK(smoothed.depth == 2);
       CHECK(smoothed.coarsest_spacing > static_cast<float>(kScale / 3.0));
       CHECK(smoothed.coarsest_spacing < static_cast<float>(kScale / 1.5));
-      const double left = amplitude(smoothed.points, wavelength, 0.5 * kSide, 4.0 * kScale) / height;
+      const double left = wave_amplitude(smoothed.points, wavelength, 0.5 * kSide, 4.0 * kScale) / height;
       const double effective = wavelength / kTau * std::sqrt(-2.0 * std::log(left));
       MESSAGE("wavelength " << ratio << " scales: " << left << ", effective scale " << effective / kScale);
       CHECK(left > before);
@@ -171,9 +158,9 @@ TEST_CASE("the V-cycle does what iteration to the scale does") {
                                           SmoothingDirection::kAlongNormal, 10'000);
     const auto end = std::chrono::steady_clock::now();
     REQUIRE(iterated.ok());
-    const double by_cycle = amplitude(smoothed.points, wavelength, 0.5 * kSide, 4.0 * kScale) / height;
+    const double by_cycle = wave_amplitude(smoothed.points, wavelength, 0.5 * kSide, 4.0 * kScale) / height;
     const double by_steps =
-        amplitude(iterated.value().points, wavelength, 0.5 * kSide, 4.0 * kScale) / height;
+        wave_amplitude(iterated.value().points, wavelength, 0.5 * kSide, 4.0 * kScale) / height;
     MESSAGE("wavelength " << wavelength << ": " << by_cycle << " and " << by_steps << " by "
                           << iterated.value().iterations << " iterations, which take "
                           << std::chrono::duration<double>(end - between) /

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "engine/core/parallel.h"
+#include "tests/support/random_points.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -27,16 +28,6 @@ bool is_permutation_of_all(std::vector<std::uint32_t> order) {
     if (order[i] != i) return false;
   }
   return true;
-}
-
-Points random_points(std::size_t count, std::uint64_t seed) {
-  Random random(seed);
-  Points points(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3d p{random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)};
-    points.set(i, p.cast<float>());
-  }
-  return points;
 }
 
 TEST_CASE("the order is a permutation") {

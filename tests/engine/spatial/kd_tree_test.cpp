@@ -7,22 +7,13 @@
 #include <limits>
 #include <numeric>
 
+#include "tests/support/random_points.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
 namespace {
 
 using namespace test;
-
-Points random_points(std::size_t count, std::uint64_t seed) {
-  Random random(seed);
-  Points points(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3d p{random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)};
-    points.set(i, p.cast<float>());
-  }
-  return coherent(points);
-}
 
 // side^3 whole-numbered points: every distance has ties, and squares are exact in float.
 Points lattice(int side) {
@@ -58,7 +49,7 @@ bool same(const std::vector<Neighbor>& found, const std::vector<Neighbor>& expec
 }
 
 TEST_CASE("the nearest points are those that brute force finds") {
-  const Points points = random_points(3000, 1);
+  const Points points = coherent_random_points(3000, 1);
   const KdTree tree(points);
   CHECK(tree.size() == 3000);
   Random random(2);
@@ -91,7 +82,7 @@ TEST_CASE("on a lattice ties are broken by index, also at the last place") {
 }
 
 TEST_CASE("more neighbours than points gives all points") {
-  const Points points = random_points(20, 3);
+  const Points points = coherent_random_points(20, 3);
   const KdTree tree(points);
   std::vector<Neighbor> found;
   tree.nearest({0, 0, 0}, 1000, found);
@@ -112,7 +103,7 @@ TEST_CASE("a search in an empty tree finds nothing") {
 }
 
 TEST_CASE("a tree over a subset answers with the indices of all points") {
-  const Points points = random_points(2000, 4);
+  const Points points = coherent_random_points(2000, 4);
   std::vector<std::uint32_t> subset;
   for (std::uint32_t i = 1; i < 2000; i += 3) subset.push_back(i);
   const KdTree tree(points, subset);
@@ -130,7 +121,7 @@ TEST_CASE("a tree over a subset answers with the indices of all points") {
 }
 
 TEST_CASE("a tree over no point at all is empty") {
-  const KdTree tree(random_points(100, 4), {});
+  const KdTree tree(coherent_random_points(100, 4), {});
   CHECK(tree.size() == 0);
   std::vector<Neighbor> found;
   tree.nearest({0, 0, 0}, 5, found);
@@ -185,7 +176,7 @@ TEST_CASE("a tree of identical points works and is quick") {
 }
 
 TEST_CASE("a moved tree keeps its points") {
-  KdTree first(random_points(100, 5));
+  KdTree first(coherent_random_points(100, 5));
   KdTree second = std::move(first);
   std::vector<Neighbor> found;
   second.nearest({0, 0, 0}, 3, found);

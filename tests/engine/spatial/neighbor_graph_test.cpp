@@ -10,6 +10,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/core/simd_dispatch.h"
+#include "tests/support/random_points.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -51,20 +52,10 @@ std::size_t count_wrong_lists(const Points& points, const NeighborGraph& graph) 
   return wrong;
 }
 
-Points random_points(std::size_t count, std::uint64_t seed) {
-  Random random(seed);
-  Points points(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3d p{random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)};
-    points.set(i, p.cast<float>());
-  }
-  return coherent(points);
-}
-
 TEST_CASE("the graph lists the neighbours that brute force finds") {
   for (const std::uint32_t k : {1U, 4U, 10U, 32U}) {
     CAPTURE(k);
-    const Points points = random_points(1500, k);
+    const Points points = coherent_random_points(1500, k);
     const NeighborGraph graph = build_neighbor_graph(points, k);
     CHECK(graph.count == 1500);
     CHECK(graph.k == k);
@@ -82,7 +73,7 @@ TEST_CASE("on a lattice full of ties the lists are still the nearest, in order o
 }
 
 TEST_CASE("duplicates share one list and never list each other") {
-  Points points = random_points(800, 21);
+  Points points = coherent_random_points(800, 21);
   Random random(22);
   for (std::size_t i = 0; i < 300; ++i) points.set(random.below(800), points[random.below(800)]);
   points = coherent(points);
@@ -99,7 +90,7 @@ TEST_CASE("duplicates share one list and never list each other") {
 }
 
 TEST_CASE("duplicates that stand apart in the order count as samples of their own") {
-  Points points = random_points(400, 23);
+  Points points = coherent_random_points(400, 23);
   for (std::size_t i = 0; i < 100; ++i) points.set(i + 200, points[i]);
   const NeighborGraph graph = build_neighbor_graph(points, 10);
   CHECK(graph.duplicate_count == 0);
@@ -116,13 +107,13 @@ TEST_CASE("duplicates that stand apart in the order count as samples of their ow
 TEST_CASE("a cloud with fewer samples than neighbours asked for lists all the others") {
   for (const std::size_t n : {1U, 2U, 3U, 10U, 11U}) {
     CAPTURE(n);
-    const Points points = random_points(n, n);
+    const Points points = coherent_random_points(n, n);
     const NeighborGraph graph = build_neighbor_graph(points, 10);
     CHECK(graph.k == std::min<std::size_t>(10, n - 1));
     CHECK(count_wrong_lists(points, graph) == 0);
   }
   CHECK(build_neighbor_graph(Points{}, 10).count == 0);
-  CHECK(build_neighbor_graph(random_points(20, 1), 0).k == 0);
+  CHECK(build_neighbor_graph(coherent_random_points(20, 1), 0).k == 0);
 }
 
 TEST_CASE("samples that all stand in one place have no neighbours") {
@@ -135,7 +126,7 @@ TEST_CASE("samples that all stand in one place have no neighbours") {
 
 TEST_CASE("a huge pile of identical samples costs no more than other samples") {
   const Surface pile{identical(60'000, {0.1F, 0.2F, 0.3F}), identical(60'000, {0, 0, 1})};
-  const Surface rest{random_points(2000, 31), identical(2000, {0, 0, 1})};
+  const Surface rest{coherent_random_points(2000, 31), identical(2000, {0, 0, 1})};
   const Points points = joined({pile, rest}).position;
   const auto start = std::chrono::steady_clock::now();
   const NeighborGraph graph = build_neighbor_graph(points, 10);
@@ -146,7 +137,7 @@ TEST_CASE("a huge pile of identical samples costs no more than other samples") {
 }
 
 TEST_CASE("padding lanes point at sample 0") {
-  const Points points = random_points(21, 5);
+  const Points points = coherent_random_points(21, 5);
   const NeighborGraph graph = build_neighbor_graph(points, 4);
   REQUIRE(graph.lanes.size() == 32 * 4);
   for (std::uint32_t j = 0; j < 4; ++j) {
@@ -156,7 +147,7 @@ TEST_CASE("padding lanes point at sample 0") {
 }
 
 TEST_CASE("the graph does not depend on the threads") {
-  const Points points = random_points(20'000, 6);
+  const Points points = coherent_random_points(20'000, 6);
   NeighborGraph one;
   with_threads(1, [&] { one = build_neighbor_graph(points, 10); });
   for (const int threads : {2, 8}) {
@@ -168,11 +159,11 @@ TEST_CASE("clouds that fill their boxes in every way have the lists of brute for
   // Around whole blocks of samples, and around whole blocks of those.
   for (const std::size_t n : {15U, 16U, 17U, 32U, 33U, 255U, 256U, 257U, 4097U}) {
     CAPTURE(n);
-    const Points points = random_points(n, n);
+    const Points points = coherent_random_points(n, n);
     CHECK(count_wrong_lists(points, build_neighbor_graph(points, 8)) == 0);
   }
   // Lists longer than a block, and nearly as long as the cloud.
-  const Points few = random_points(300, 12);
+  const Points few = coherent_random_points(300, 12);
   for (const std::uint32_t k : {17U, 48U, 100U, 298U, 299U}) {
     CAPTURE(k);
     CHECK(count_wrong_lists(few, build_neighbor_graph(few, k)) == 0);
@@ -187,10 +178,10 @@ TEST_CASE("outliers, clusters, lines and any order have the lists of brute force
     const Vec3d center = 10.0 * Vec3d(static_cast<double>(i % 7), static_cast<double>(i % 3), 0.0);
     clusters.set(i, (center + size * random.direction()).cast<float>());
   }
-  Points outliers = random_points(2000, 14);
+  Points outliers = coherent_random_points(2000, 14);
   for (std::size_t i = 0; i < 2000; i += 97) outliers.set(i, (1000.0 * random.direction()).cast<float>());
   outliers = coherent(outliers);
-  Points unordered = random_points(2000, 15);
+  Points unordered = coherent_random_points(2000, 15);
   for (std::size_t i = 0; i < 1000; ++i) {
     const Vec3f here = unordered[i];
     const std::size_t other = random.below(2000);
@@ -221,7 +212,7 @@ TEST_CASE("every instruction set finds the same graph") {
 TEST_CASE("a cancelled graph returns at once") {
   const ExecutionContext context;
   context.cancel();
-  const Points points = random_points(60'000, 7);
+  const Points points = coherent_random_points(60'000, 7);
   const auto start = std::chrono::steady_clock::now();
   (void)build_neighbor_graph(points, 32, &context);
   CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(1));

@@ -9,22 +9,13 @@
 
 #include "engine/core/parallel.h"
 #include "engine/core/simd_dispatch.h"
+#include "tests/support/random_points.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
 namespace {
 
 using namespace test;
-
-Points random_points(std::size_t count, std::uint64_t seed) {
-  Random random(seed);
-  Points points(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3d p{random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)};
-    points.set(i, p.cast<float>());
-  }
-  return coherent(points);
-}
 
 RadiusGraph graph_of(const Points& points, float radius, std::uint32_t limit = 64) {
   auto graph = build_radius_graph(points, {.radius = radius, .limit = limit});
@@ -70,7 +61,7 @@ void check_against_brute_force(const Points& points, float radius, std::uint32_t
 }
 
 TEST_CASE("the radius graph lists what brute force finds, by distance, then index") {
-  const Points points = random_points(2100, 3);
+  const Points points = coherent_random_points(2100, 3);
   for (const float radius : {1e-4F, 0.1F, 0.25F}) {
     CAPTURE(radius);
     check_against_brute_force(points, radius, 64);
@@ -78,7 +69,7 @@ TEST_CASE("the radius graph lists what brute force finds, by distance, then inde
 }
 
 TEST_CASE("what exceeds the limit is cut to the nearest, and counted") {
-  const Points points = random_points(1500, 4);
+  const Points points = coherent_random_points(1500, 4);
   for (const std::uint32_t limit : {1U, 7U, 20U}) {
     CAPTURE(limit);
     check_against_brute_force(points, 0.3F, limit);
@@ -100,7 +91,7 @@ TEST_CASE("a neighbour at exactly the radius counts, and ties go by index") {
 }
 
 TEST_CASE("duplicates have equal lists and never list each other") {
-  Points points = random_points(900, 5);
+  Points points = coherent_random_points(900, 5);
   Random random(6);
   for (std::size_t i = 0; i < 300; ++i) points.set(random.below(900), points[random.below(900)]);
   points = coherent(points);
@@ -129,7 +120,7 @@ TEST_CASE("degenerate clouds have the lists that they can have") {
 }
 
 TEST_CASE("radii and limits out of range are refused by name") {
-  const Points points = random_points(10, 1);
+  const Points points = coherent_random_points(10, 1);
   for (const float radius : {0.0F, -1.0F, std::nanf(""), std::numeric_limits<float>::infinity()}) {
     const auto graph = build_radius_graph(points, {.radius = radius});
     REQUIRE_FALSE(graph.ok());
@@ -168,7 +159,7 @@ TEST_CASE("the radius graph does not depend on threads or instruction sets") {
 TEST_CASE("a cancelled radius graph is an error") {
   const ExecutionContext context;
   context.cancel();
-  const auto graph = build_radius_graph(random_points(5000, 2), {.radius = 0.1F}, &context);
+  const auto graph = build_radius_graph(coherent_random_points(5000, 2), {.radius = 0.1F}, &context);
   REQUIRE_FALSE(graph.ok());
   CHECK(graph.error().code == ErrorCode::kCancelled);
 }
