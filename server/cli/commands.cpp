@@ -76,8 +76,10 @@ int rewrite(const Options& options, std::ostream& out, std::ostream& err, Change
   const auto changed = change(std::move(imported).value().cloud, report);
   if (!changed) {
     const Error& error = changed.error();
-    err << "pointwright: " << (error.field.empty() ? options.input : "--" + error.field) << ": "
-        << error.message << "\n";
+    // The engine's name of a parameter ends with the option's.
+    const std::string option = error.field.substr(error.field.rfind('.') + 1);
+    err << "pointwright: " << (option.empty() ? options.input : "--" + option) << ": " << error.message
+        << "\n";
     return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
   }
   if (const int failed = write_output(changed.value(), options, err); failed != 0) return failed;

@@ -180,6 +180,8 @@ TEST_CASE("simplify keeps what it is told to, with the attributes, and smooth ke
       run({POINTWRIGHT_PATH, "smooth", ply, folder / "steps.ply", "--iterations", "5", "--preserve", "local"})
           .status == 0);
   CHECK(height(folder / "steps.ply") > height(folder / "smooth.ply"));
+  const Ended none = run({POINTWRIGHT_PATH, "simplify", ply, folder / "none.ply", "--count", "0"});
+  CHECK(none.err.find("--count: ") != std::string::npos);
 
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
            {"smooth"},
