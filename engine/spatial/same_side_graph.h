@@ -9,7 +9,7 @@
 
 namespace pointwright {
 
-/// Of each sample's `candidates` nearest neighbours, the k nearest whose normals are on its side (n . n' > 0).
+/// Of each sample's `candidates` nearest neighbours, the k nearest whose normals are on its side: n . n' > 0.
 /// Short rows are filled up with the sample itself, at their end.
 /// Shapes, pre, cost, determinism, cancel: as build_neighbor_graph() with `candidates` neighbours
 NeighborGraph same_side_graph(const Points& position, const Points& normal, std::uint32_t k,
