@@ -44,7 +44,7 @@ float taubin_mu(float lambda, float pass_band) {
 }
 
 Result<void> validate(const UmbrellaParams& params) {
-  if (const auto valid = validate_lambda(params.lambda); !valid) return valid;
+  if (auto valid = validate_lambda(params.lambda); !valid) return valid;
   if (params.iterations > 100'000) {
     return out_of_range("at most 100,000 iterations", "iterations", 100'000,
                         static_cast<double>(params.iterations));

@@ -199,8 +199,8 @@ Points moved_along_normals(const Points& points, const Points& smoothed, const N
 }  // namespace
 
 Result<void> validate(const VCycleParams& params) {
-  if (const auto valid = validate_scale(params.scale); !valid) return valid;
-  if (const auto valid = validate_lambda(params.lambda); !valid) return valid;
+  if (auto valid = validate_scale(params.scale); !valid) return valid;
+  if (auto valid = validate_lambda(params.lambda); !valid) return valid;
   if (params.pre_iterations > 100) {
     return out_of_range("at most 100 iterations on the way down", "pre_iterations", 100,
                         params.pre_iterations);
