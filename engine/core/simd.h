@@ -140,6 +140,17 @@ POINTWRIGHT_SIMD_INLINE F gather(const float* base, I index) {
 #endif
 }
 
+POINTWRIGHT_SIMD_INLINE I gather(const std::int32_t* base, I index) {
+#if defined(__AVX512F__) && defined(__AVX512DQ__)
+  return reinterpret_cast<I>(
+      _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), 0xffff, reinterpret_cast<__m512i>(index), base, 4));
+#elif defined(__AVX2__)
+  return reinterpret_cast<I>(_mm256_i32gather_epi32(base, reinterpret_cast<__m256i>(index), 4));
+#else
+  return I{base[index[0]], base[index[1]], base[index[2]], base[index[3]]};
+#endif
+}
+
 /// The lanes of the mask as bits, lane 0 the lowest.
 POINTWRIGHT_SIMD_INLINE std::uint32_t mask_bits(Mask m) {
 #if defined(__AVX512F__) && defined(__AVX512DQ__)

@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -75,6 +76,7 @@ TEST_CASE("vector operations agree with scalar arithmetic") {
     wrong += data.column(9, i) != std::floor(a);
     wrong += data.column(10, i) != std::copysign(a, b);
     wrong += data.column(15, i) != 1.0F;
+    wrong += std::bit_cast<std::uint32_t>(data.column(16, i)) != data.index[data.index[i]];
     sin_error = std::max(sin_error, std::abs(data.column(11, i) - std::sin(double{a})));
     cos_error = std::max(cos_error, std::abs(data.column(12, i) - std::cos(double{a})));
     if (std::abs(b) < 87.0F) {

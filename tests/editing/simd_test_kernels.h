@@ -11,11 +11,11 @@ namespace pointwright {
 struct SimdProbe {
   const float* a = nullptr;
   const float* b = nullptr;
-  const std::uint32_t* index = nullptr;  ///< into a
+  const std::uint32_t* index = nullptr;  ///< into a, and into itself
   float* out = nullptr;                  ///< kSimdProbeColumns columns of `count`
   std::size_t count = 0;                 ///< a multiple of 16
 };
-inline constexpr std::size_t kSimdProbeColumns = 17;
+inline constexpr std::size_t kSimdProbeColumns = 18;
 
 }  // namespace pointwright
 

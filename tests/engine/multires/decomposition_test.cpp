@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/parallel.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -255,18 +255,16 @@ TEST_CASE("a cancelled decomposition says so") {
   CHECK(parts.error().code == ErrorCode::kCancelled);
 }
 
-TEST_CASE("the decomposition does not depend on the threads") {
+TEST_CASE("the decomposition depends neither on the threads nor on the instruction set") {
   const Surface surface = bumpy_sphere(20'000, {.count = 300, .height = 0.01, .width = 0.05});
-  Decomposition one;
-  with_threads(1, [&] { one = run(surface, 0.12).parts; });
-  for (const int threads : {2, 8}) {
-    with_threads(threads, [&] {
-      const Decomposition parts = run(surface, 0.12).parts;
-      CHECK(parts.base == one.base);
-      CHECK(parts.normal == one.normal);
-      CHECK(parts.detail == one.detail);
-      CHECK(parts.mean_iterations == one.mean_iterations);
-    });
+  for (const PlaneWeights weights : {PlaneWeights::kCompact, PlaneWeights::kGaussian}) {
+    for_all_machines([&] { return run(surface, 0.12, {.weights = weights}).parts; },
+                     [](const Decomposition& one, const Decomposition& parts) {
+                       CHECK(parts.base == one.base);
+                       CHECK(parts.normal == one.normal);
+                       CHECK(parts.detail == one.detail);
+                       CHECK(parts.mean_iterations == one.mean_iterations);
+                     });
   }
 }
 
