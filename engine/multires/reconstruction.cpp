@@ -6,7 +6,7 @@
 #include "engine/core/check.h"
 #include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
-#include "engine/multires/carried_normals_kernels.h"
+#include "engine/multires/normal_stencil.h"
 #include "engine/normals/estimation.h"
 #include "engine/normals/orientation.h"
 
@@ -43,26 +43,15 @@ void rebuild_positions(const MultiresSurface& rest, std::size_t k, float gain, c
 // Normals of the level above `k`, whose samples have moved already.
 void carry(const MultiresSurface& rest, std::size_t k, const NeighborGraph& graph, const Level& base,
            Level& above, const ExecutionContext* context) {
-  const auto columns = [](const Points& points, const float*(&to)[3]) {
-    to[0] = points.x();
-    to[1] = points.y();
-    to[2] = points.z();
-  };
-  CarryKernelArgs args{};
-  columns(rest.levels[k + 1].position, args.rest_position);
-  columns(rest.levels[k + 1].normal, args.rest_normal);
-  columns(above.position, args.position);
-  columns(rest.levels[k].normal, args.rest_base_normal);
-  columns(base.normal, args.base_normal);
-  args.neighbors = graph.lanes.data();
-  args.k = graph.k;
-  args.normal[0] = above.normal.x();
-  args.normal[1] = above.normal.y();
-  args.normal[2] = above.normal.z();
-  const auto kernel = POINTWRIGHT_KERNEL(carry_normals);
+  const NormalStencil stencil(rest.levels[k + 1], graph, NormalStencil::all_blocks(graph.count), context);
+  const NormalStencil::Moved moved{.rest = &rest.levels[k + 1],
+                                   .rest_base = &rest.levels[k],
+                                   .base_normal = &base.normal,
+                                   .position = &above.position,
+                                   .normal = &above.normal};
   parallel_for(
-      graph.count, [&](std::size_t begin, std::size_t end) { kernel(args, begin, end); }, kParallelBlock,
-      context);
+      stencil.blocks().size(), [&](std::size_t begin, std::size_t end) { stencil.carry(moved, begin, end); },
+      kParallelBlock / kSimdBlock, context);
 }
 
 }  // namespace
