@@ -1,8 +1,8 @@
 #include "engine/editing/deformation.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <string>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
@@ -16,40 +16,81 @@ Error non_finite(const char* field) {
   return Error{.code = ErrorCode::kNonFinite, .message = "the number must be finite", .field = field};
 }
 
+Error beyond(const char* message, const char* field, double limit, double actual) {
+  return Error{.code = ErrorCode::kInvalidArgument,
+               .message = message,
+               .field = field,
+               .limit = limit,
+               .actual = actual};
+}
+
 Result<void> check_length(const Vec3d& v, const char* field, const char* message) {
   if (!v.allFinite()) return non_finite(field);
   const double length = v.stableNorm();
   if (length <= kMaxDeformationLength) return {};
-  return Error{.code = ErrorCode::kInvalidArgument,
-               .message = message,
-               .field = field,
-               .limit = kMaxDeformationLength,
-               .actual = length};
+  return beyond(message, field, kMaxDeformationLength, length);
+}
+
+Result<void> check_point(const Vec3d& point, const char* field) {
+  return check_length(point, field, "the point must lie within 1e9 of zero");
+}
+
+Result<void> check_axis(const Vec3d& axis) {
+  if (!axis.allFinite()) return non_finite("axis");
+  if (axis.cwiseAbs().maxCoeff() >= kMinDirectionLength) return {};
+  return Error{.code = ErrorCode::kInvalidArgument, .message = "the axis must not be zero", .field = "axis"};
+}
+
+Result<void> check_angle(double angle_rad) {
+  if (!std::isfinite(angle_rad)) return non_finite("angle_rad");
+  if (std::abs(angle_rad) <= kMaxDeformationAngle) return {};
+  return beyond("the angle must be at most 100 turns either way", "angle_rad", kMaxDeformationAngle,
+                angle_rad);
 }
 
 Result<void> validate_one(const Translation& translation) {
-  return check_length(translation.vector, "deformation.vector", "the translation must be at most 1e9 long");
+  return check_length(translation.vector, "vector", "the translation must be at most 1e9 long");
+}
+
+Result<void> validate_one(const NormalOffset& offset) {
+  if (!std::isfinite(offset.distance)) return non_finite("distance");
+  if (std::abs(offset.distance) <= kMaxDeformationLength) return {};
+  return beyond("the distance must be at most 1e9 either way", "distance", kMaxDeformationLength,
+                offset.distance);
+}
+
+Result<void> validate_one(const TowardPoint& toward) {
+  if (auto point = check_point(toward.target, "target"); !point) return point;
+  if (!std::isfinite(toward.amount)) return non_finite("amount");
+  if (toward.amount >= -kMaxDeformationFactor && toward.amount <= 1.0) return {};
+  return beyond("the amount must lie between -1000 and 1", "amount", 1.0, toward.amount);
 }
 
 Result<void> validate_one(const Rotation& rotation) {
-  auto point =
-      check_length(rotation.point, "deformation.point", "the axis' point must lie within 1e9 of zero");
-  if (!point) return point;
-  if (!rotation.axis.allFinite()) return non_finite("deformation.axis");
-  if (rotation.axis.cwiseAbs().maxCoeff() < kMinDirectionLength) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "the rotation axis must not be zero",
-                 .field = "deformation.axis"};
+  if (auto point = check_point(rotation.point, "point"); !point) return point;
+  if (auto axis = check_axis(rotation.axis); !axis) return axis;
+  return check_angle(rotation.angle_rad);
+}
+
+Result<void> validate_one(const Scaling& scaling) {
+  if (auto center = check_point(scaling.center, "center"); !center) return center;
+  if (!scaling.factors.allFinite()) return non_finite("factors");
+  if (scaling.factors.minCoeff() >= 1.0 / kMaxDeformationFactor &&
+      scaling.factors.maxCoeff() <= kMaxDeformationFactor) {
+    return {};
   }
-  if (!std::isfinite(rotation.angle_rad)) return non_finite("deformation.angle_rad");
-  if (std::abs(rotation.angle_rad) > kMaxDeformationAngle) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "the angle must be at most 100 turns either way",
-                 .field = "deformation.angle_rad",
-                 .limit = kMaxDeformationAngle,
-                 .actual = rotation.angle_rad};
-  }
-  return {};
+  return beyond("the factors must lie between 0.001 and 1000", "factors", kMaxDeformationFactor,
+                scaling.factors.maxCoeff());
+}
+
+Result<void> validate_one(const Twist& twist) {
+  if (auto point = check_point(twist.point, "point"); !point) return point;
+  if (auto axis = check_axis(twist.axis); !axis) return axis;
+  if (auto angle = check_angle(twist.angle_rad); !angle) return angle;
+  if (!std::isfinite(twist.length)) return non_finite("length");
+  constexpr double kLeastLength = 1.0 / kMaxDeformationLength;
+  if (twist.length >= kLeastLength && twist.length <= kMaxDeformationLength) return {};
+  return beyond("the length must lie between 1e-9 and 1e9", "length", kMaxDeformationLength, twist.length);
 }
 
 Mat3d cross_matrix(const Vec3d& a) {
@@ -64,89 +105,135 @@ Mat3d rotation_matrix(const Vec3d& axis, double angle) {
   return Mat3d::Identity() + std::sin(angle) * K + (1.0 - std::cos(angle)) * K * K;
 }
 
-// The leading 12 bits of v, as a float.
-float leading_bits(double v) {
-  int exponent = 0;
-  const double fraction = std::frexp(v, &exponent);
-  return static_cast<float>(std::ldexp(std::trunc(std::ldexp(fraction, 12)), exponent - 12));
+// An elementary deformation at q: where q goes, dF/dq and dF/dt.
+struct LocalDeformation {
+  Vec3d image;
+  Mat3d jacobian;
+  Vec3d velocity;
+};
+
+LocalDeformation scaled(const Vec3d& center, const Vec3d& factors, const Vec3d& q, double t) {
+  const Vec3d velocity = (factors - Vec3d::Ones()).cwiseProduct(q - center);
+  const Vec3d scale = Vec3d::Ones() + t * (factors - Vec3d::Ones());
+  return {q + t * velocity, scale.asDiagonal(), velocity};
+}
+
+LocalDeformation local_at(const Translation& translation, const Vec3d& q, double t, const LocalSurface&) {
+  return {q + t * translation.vector, Mat3d::Identity(), translation.vector};
+}
+
+LocalDeformation local_at(const NormalOffset& offset, const Vec3d& q, double t, const LocalSurface& surface) {
+  const Vec3d velocity = offset.distance * surface.normal;
+  return {q + t * velocity, Mat3d::Identity() + t * offset.distance * surface.shape_operator, velocity};
+}
+
+LocalDeformation local_at(const TowardPoint& toward, const Vec3d& q, double t, const LocalSurface&) {
+  return scaled(toward.target, Vec3d::Constant(1.0 - toward.amount), q, t);
+}
+
+LocalDeformation local_at(const Rotation& rotation, const Vec3d& q, double t, const LocalSurface&) {
+  const Mat3d R = rotation_matrix(rotation.axis, t * rotation.angle_rad);
+  const Vec3d turned = R * (q - rotation.point);
+  return {turned + rotation.point, R,
+          rotation.angle_rad * (cross_matrix(rotation.axis.stableNormalized()) * turned)};
+}
+
+LocalDeformation local_at(const Scaling& scaling, const Vec3d& q, double t, const LocalSurface&) {
+  return scaled(scaling.center, scaling.factors, q, t);
+}
+
+LocalDeformation local_at(const Twist& twist, const Vec3d& q, double t, const LocalSurface&) {
+  const Vec3d axis = twist.axis.stableNormalized();
+  const double rate = twist.angle_rad / twist.length;
+  const double height = axis.dot(q - twist.point);
+  const Mat3d R = rotation_matrix(axis, t * rate * height);
+  const Vec3d turned = R * (q - twist.point);
+  const Vec3d round_axis = rate * axis.cross(turned);  // of an angle of 1 per unit of height
+  return {turned + twist.point, R + t * round_axis * axis.transpose(), height * round_axis};
+}
+
+LocalDeformation local_of(const ElementaryDeformation& one, const Vec3d& q, double t,
+                          const LocalSurface& surface) {
+  return std::visit([&](const auto& each) { return local_at(each, q, t, surface); }, one);
 }
 
 }  // namespace
 
-Result<void> validate(const Deformation& deformation) {
-  return std::visit([](const auto& one) { return validate_one(one); }, deformation);
-}
-
-Vec3d deform_point(const Deformation& deformation, const Vec3d& p, double t) {
-  if (const auto* translation = std::get_if<Translation>(&deformation)) return p + t * translation->vector;
-  const auto& rotation = std::get<Rotation>(deformation);
-  return rotation_matrix(rotation.axis, t * rotation.angle_rad) * (p - rotation.point) + rotation.point;
-}
-
-Mat3d deformation_jacobian(const Deformation& deformation, const Vec3d& p, double t,
-                           const Vec3d& t_gradient) {
-  if (const auto* translation = std::get_if<Translation>(&deformation)) {
-    return Mat3d::Identity() + translation->vector * t_gradient.transpose();
-  }
-  const auto& rotation = std::get<Rotation>(deformation);
-  const Mat3d R = rotation_matrix(rotation.axis, t * rotation.angle_rad);
-  const Vec3d turned = R * (p - rotation.point);
-  const Vec3d velocity =
-      rotation.angle_rad * (cross_matrix(rotation.axis.stableNormalized()) * turned);  // dF/dt
-  return R + velocity * t_gradient.transpose();
-}
-
-DeformMap to_deform_map(const Deformation& deformation, const Vec3d& origin) {
-  DeformMap map{};
-  const auto assign = [](float* to, const Vec3d& from) {
-    for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(from[c]);
-  };
-  if (const auto* translation = std::get_if<Translation>(&deformation)) {
-    assign(map.vector, translation->vector);
-    return map;
-  }
-  const auto& rotation = std::get<Rotation>(deformation);
-  const Vec3d axis = rotation.axis.stableNormalized();
-  const Vec3d point = rotation.point - origin;
-  map.rotates = true;
-  assign(map.axis, axis);
-  assign(map.center, point - axis * axis.dot(point));
-  const double quarters = rotation.angle_rad / (std::numbers::pi / 2.0);
-  map.angle = static_cast<float>(rotation.angle_rad);
-  map.quarter_turns = static_cast<float>(quarters);
-  map.quarter_high = leading_bits(quarters);
-  map.quarter_middle = leading_bits(quarters - double{map.quarter_high});
-  map.quarter_low = static_cast<float>(quarters - double{map.quarter_high} - double{map.quarter_middle});
-  return map;
-}
-
-void deform(const Deformation& deformation, const Vec3d& origin, const ScaleField& field,
-            const Points& position, const Points& normal, Points& deformed_position,
-            Points& deformed_normal) {
-  const std::size_t n = position.size();
-  POINTWRIGHT_CHECK(normal.size() == n, "one normal per sample");
-  POINTWRIGHT_CHECK(field.size() == n && field.t.size() >= padded_to_block(n), "a field of the same samples");
-  deformed_position.resize(n);
-  deformed_normal.resize(n);
-  const DeformMap map = to_deform_map(deformation, origin);
-  const auto kernel = POINTWRIGHT_KERNEL(deform_levels);
-  parallel_for(n, [&](std::size_t begin, std::size_t end) {
-    const LevelColumns level{
-        .position = {position.x() + begin, position.y() + begin, position.z() + begin},
-        .normal = {normal.x() + begin, normal.y() + begin, normal.z() + begin},
-        .detail = nullptr,
-        .deformed_position = {deformed_position.x() + begin, deformed_position.y() + begin,
-                              deformed_position.z() + begin},
-        .deformed_normal = {deformed_normal.x() + begin, deformed_normal.y() + begin,
-                            deformed_normal.z() + begin}};
-    kernel(DeformJob{.map = &map,
-                     .t = field.t.data() + begin,
-                     .gradient = {field.gradient.x() + begin, field.gradient.y() + begin,
-                                  field.gradient.z() + begin},
-                     .level = &level,
-                     .level_count = 1},
-           padded_to_block(end - begin));
+bool is_rigid(const Deformation& deformation) {
+  return std::all_of(deformation.steps.begin(), deformation.steps.end(), [](const auto& one) {
+    return std::holds_alternative<Translation>(one) || std::holds_alternative<Rotation>(one);
   });
+}
+
+Mat3d whole_rotation(const Deformation& deformation) {
+  Mat3d all = Mat3d::Identity();
+  for (const ElementaryDeformation& one : deformation.steps) {
+    if (const auto* rotation = std::get_if<Rotation>(&one))
+      all = rotation_matrix(rotation->axis, rotation->angle_rad) * all;
+  }
+  // Whole turns come home to the bit.
+  constexpr double kRounding = 1e-12;
+  if ((all - Mat3d::Identity()).cwiseAbs().maxCoeff() < kRounding) all.setIdentity();
+  return all;
+}
+
+bool needs_shape_operators(const Deformation& deformation) {
+  return std::any_of(deformation.steps.begin(), deformation.steps.end(),
+                     [](const auto& one) { return std::holds_alternative<NormalOffset>(one); });
+}
+
+Result<void> validate(const Deformation& deformation) {
+  const std::size_t count = deformation.steps.size();
+  if (count == 0 || count > kMaxDeformationSteps) {
+    return beyond("a deformation has 1 to 8 steps", "deformation.steps",
+                  static_cast<double>(kMaxDeformationSteps), static_cast<double>(count));
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const ElementaryDeformation& one = deformation.steps[i];
+    const std::string step = count == 1 ? "deformation" : "deformation.steps[" + std::to_string(i) + "]";
+    if (i > 0 && std::holds_alternative<NormalOffset>(one)) {
+      return Error{.code = ErrorCode::kInvalidArgument,
+                   .message = "a step along the normal must be the first one",
+                   .field = step + ".type"};
+    }
+    auto valid = std::visit([](const auto& each) { return validate_one(each); }, one);
+    if (!valid) {
+      Error error = valid.error();
+      error.field = step + "." + error.field;
+      return error;
+    }
+  }
+  return {};
+}
+
+Vec3d deform_point(const Deformation& deformation, const Vec3d& p, double t, const LocalSurface& surface) {
+  Vec3d q = p;
+  for (const ElementaryDeformation& one : deformation.steps) q = local_of(one, q, t, surface).image;
+  return q;
+}
+
+Mat3d deformation_jacobian(const Deformation& deformation, const Vec3d& p, double t, const Vec3d& t_gradient,
+                           const LocalSurface& surface) {
+  LocalDeformation all{p, Mat3d::Identity(), Vec3d::Zero()};
+  for (const ElementaryDeformation& one : deformation.steps) {
+    const LocalDeformation step = local_of(one, all.image, t, surface);
+    all = {step.image, step.jacobian * all.jacobian, step.jacobian * all.velocity + step.velocity};
+  }
+  return all.jacobian + all.velocity * t_gradient.transpose();
+}
+
+void deform(const Deformation& deformation, const Vec3d& origin, const ScaleField& field, const Level& level,
+            Level& deformed, const ShapeOperators* shape) {
+  const std::size_t n = level.position.size();
+  deformed.position.resize(n);
+  deformed.normal.resize(n);
+  const DeformMap map = to_deform_map(deformation, origin);
+  const std::vector<std::uint32_t> blocks = NormalStencil::all_blocks(n);
+  const DeformArgs args = deform_args(map, blocks, field, level, deformed, shape);
+  const auto kernel = POINTWRIGHT_KERNEL(deform_samples);
+  parallel_for(
+      blocks.size(), [&](std::size_t begin, std::size_t end) { kernel(args, begin, end); },
+      kParallelBlock / kSimdBlock);
 }
 
 }  // namespace pointwright

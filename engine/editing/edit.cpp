@@ -2,83 +2,96 @@
 
 #include <algorithm>
 #include <array>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
 #include "engine/editing/deformation_map.h"
+#include "engine/editing/edit_plan.h"
+#include "engine/multires/reconstruction.h"
 
 namespace pointwright {
 namespace {
 
-void copy_columns(const Points& from, Points& to, std::size_t begin, std::size_t padded_end) {
-  std::copy(from.x() + begin, from.x() + padded_end, to.x() + begin);
-  std::copy(from.y() + begin, from.y() + padded_end, to.y() + begin);
-  std::copy(from.z() + begin, from.z() + padded_end, to.z() + begin);
-}
+// A range of a plan's list of blocks is as many samples as other ranges are.
+constexpr std::size_t kBlocksOfRange = kParallelBlock / kSimdBlock;
 
-void check_shapes(const MultiresSurface& surface, const EditParams& params, const ScaleField& field) {
+void check_shapes(const MultiresSurface& surface, const EditPlan& plan, const EditParams& params,
+                  const ScaleField& field, const MultiresSurface& edited) {
   const std::size_t n = surface.sample_count();
+  POINTWRIGHT_CHECK(&surface != &edited, "the result is another surface");
+  POINTWRIGHT_CHECK(plan.serves(params), "a plan for such parameters");
   POINTWRIGHT_CHECK(surface.levels.size() == surface.band_count() + 1, "one level more than bands");
-  POINTWRIGHT_CHECK(params.level < surface.levels.size(), "a level of the surface");
   POINTWRIGHT_CHECK(field.size() == n && field.t.size() >= padded_to_block(n), "a field of the same samples");
-  for (const Level& level : surface.levels) {
-    POINTWRIGHT_CHECK(level.position.size() == n && level.normal.size() == n, "levels of the same samples");
-  }
-  for (const auto& column : surface.detail) POINTWRIGHT_CHECK(column.size() >= n, "one detail per sample");
-}
-
-// The columns of level k from sample `begin` on, moved from `rest` to `edited`.
-LevelColumns columns_at(const Level& rest, Level& edited, std::size_t begin) {
-  const Points& p = rest.position;
-  const Points& n = rest.normal;
-  Points& q = edited.position;
-  Points& m = edited.normal;
-  return {.position = {p.x() + begin, p.y() + begin, p.z() + begin},
-          .normal = {n.x() + begin, n.y() + begin, n.z() + begin},
-          .detail = nullptr,
-          .deformed_position = {q.x() + begin, q.y() + begin, q.z() + begin},
-          .deformed_normal = {m.x() + begin, m.y() + begin, m.z() + begin}};
-}
-
-// The detail columns from `begin` on; those that end within the last SIMD block are padded into `padding`.
-const float* detail_at(const std::vector<float>& column, std::size_t begin, std::size_t end,
-                       std::vector<float>& padding) {
-  const std::size_t padded_end = begin + padded_to_block(end - begin);
-  if (column.size() >= padded_end) return column.data() + begin;
-  padding.assign(padded_end - begin, 0.0F);
-  std::copy(column.begin() + static_cast<std::ptrdiff_t>(begin),
-            column.begin() + static_cast<std::ptrdiff_t>(end), padding.begin());
-  return padding.data();
-}
-
-void resize_like(const MultiresSurface& surface, MultiresSurface& edited) {
-  edited.levels.resize(surface.levels.size());
-  edited.detail.resize(surface.detail.size());
+  POINTWRIGHT_CHECK(
+      edited.levels.size() == surface.levels.size() && edited.band_count() == surface.band_count(),
+      "a copy of the surface");
   for (std::size_t k = 0; k < surface.levels.size(); ++k) {
-    edited.levels[k].position.resize(surface.sample_count());
-    edited.levels[k].normal.resize(surface.sample_count());
+    for (const Level* level : {&surface.levels[k], &edited.levels[k]})
+      POINTWRIGHT_CHECK(level->position.size() == n && level->normal.size() == n,
+                        "levels of the same samples");
   }
-  for (std::size_t k = 0; k < surface.detail.size(); ++k) edited.detail[k].resize(surface.detail[k].size());
+  for (std::size_t k = 0; k < surface.band_count(); ++k)
+    POINTWRIGHT_CHECK(surface.detail[k].size() == n && edited.detail[k].size() == n, "one detail per sample");
 }
 
-// What an edit leaves alone: detail coefficients and the coarser levels.
-void copy_block(const MultiresSurface& surface, std::size_t edited_level, std::size_t begin, std::size_t end,
-                MultiresSurface& edited) {
-  const std::size_t padded_end = begin + padded_to_block(end - begin);
-  for (std::size_t k = 0; k < edited_level; ++k) {
-    copy_columns(surface.levels[k].position, edited.levels[k].position, begin, padded_end);
-    copy_columns(surface.levels[k].normal, edited.levels[k].normal, begin, padded_end);
+// The entries of a detail column that do not fill a block, padded.
+struct LastBlock {
+  std::size_t first;
+  std::array<float, kSimdBlock> rest{};
+  std::array<float, kSimdBlock> now{};
+
+  explicit LastBlock(const std::vector<float>& detail) : first(detail.size() / kSimdBlock * kSimdBlock) {
+    std::copy(detail.begin() + static_cast<std::ptrdiff_t>(first), detail.end(), rest.begin());
+    now = rest;  // where the block does not move
   }
-  for (std::size_t k = 0; k < surface.detail.size(); ++k) {
-    const std::vector<float>& from = surface.detail[k];
-    const std::size_t last = end == surface.sample_count() ? from.size() : end;
-    std::copy(from.begin() + static_cast<std::ptrdiff_t>(begin),
-              from.begin() + static_cast<std::ptrdiff_t>(last),
-              edited.detail[k].begin() + static_cast<std::ptrdiff_t>(begin));
+  void copy_to(std::vector<float>& detail) const {
+    std::copy_n(now.begin(), detail.size() - first, detail.begin() + static_cast<std::ptrdiff_t>(first));
   }
+};
+
+// Positions and detail of level k + 1 from how level k stands.
+RaiseArgs raise_args(const MultiresSurface& rest, std::size_t k, const std::vector<std::uint32_t>& blocks,
+                     const EditParams& params, const ScaleField& field, MultiresSurface& edited,
+                     LastBlock& last) {
+  const Level& rest_base = rest.levels[k];
+  const Level& base = edited.levels[k];
+  const Points& above = rest.levels[k + 1].position;
+  Points& raised = edited.levels[k + 1].position;
+  return {.blocks = blocks.data(),
+          .t = field.t.data(),
+          .gain = params.gains.empty() ? 1.0F : params.gains[k],
+          .rest_base_position = {rest_base.position.x(), rest_base.position.y(), rest_base.position.z()},
+          .rest_base_normal = {rest_base.normal.x(), rest_base.normal.y(), rest_base.normal.z()},
+          .base_position = {base.position.x(), base.position.y(), base.position.z()},
+          .base_normal = {base.normal.x(), base.normal.y(), base.normal.z()},
+          .rest_position = {above.x(), above.y(), above.z()},
+          .rest_detail = rest.detail[k].data(),
+          .position = {raised.x(), raised.y(), raised.z()},
+          .detail = edited.detail[k].data(),
+          .last_block = static_cast<std::uint32_t>(last.first / kSimdBlock),
+          .last_rest_detail = last.rest.data(),
+          .last_detail = last.now.data()};
+}
+
+TurnArgs turn_args(const Points& rest, const std::vector<std::uint32_t>& blocks, const Mat3d& rotation,
+                   const ScaleField& field, Points& normal) {
+  TurnArgs args{.blocks = blocks.data(),
+                .t = field.t.data(),
+                .gradient = {field.gradient.x(), field.gradient.y(), field.gradient.z()},
+                .is_identity = rotation == Mat3d::Identity(),
+                .rest_normal = {rest.x(), rest.y(), rest.z()},
+                .normal = {normal.x(), normal.y(), normal.z()}};
+  for (int i = 0; i < 9; ++i) args.rotation[i] = static_cast<float>(rotation(i / 3, i % 3));
+  return args;
+}
+
+NormalStencil::Moved moved_level(const MultiresSurface& rest, std::size_t k, MultiresSurface& edited) {
+  return {.rest = &rest.levels[k],
+          .rest_base = &rest.levels[k - 1],
+          .base_normal = &edited.levels[k - 1].normal,
+          .position = &edited.levels[k].position,
+          .normal = &edited.levels[k].normal};
 }
 
 }  // namespace
@@ -92,40 +105,56 @@ Result<void> validate(const EditParams& params, const MultiresSurface& surface) 
                  .limit = static_cast<double>(surface.band_count()),
                  .actual = static_cast<double>(params.level)};
   }
+  if (auto gains = validate(ReconstructParams{.level = params.level, .gains = params.gains}, surface); !gains)
+    return gains;
   return validate(params.deformation);
 }
 
-void apply_edit(const MultiresSurface& surface, const EditParams& params, const ScaleField& field,
-                const Vec3d& origin, MultiresSurface& edited) {
-  POINTWRIGHT_CHECK(&surface != &edited, "the result is another surface");
-  check_shapes(surface, params, field);
-  resize_like(surface, edited);
+void apply_edit(const MultiresSurface& surface, const EditPlan& plan, const EditParams& params,
+                const ScaleField& field, const Vec3d& origin, MultiresSurface& edited) {
+  check_shapes(surface, plan, params, field, edited);
   const DeformMap map = to_deform_map(params.deformation, origin);
-  const auto kernel = POINTWRIGHT_KERNEL(deform_levels);
-  const std::size_t level_count = surface.levels.size() - params.level;
-  parallel_for(surface.sample_count(), [&](std::size_t begin, std::size_t end) {
-    copy_block(surface, params.level, begin, end, edited);
-    std::vector<LevelColumns> columns(level_count);
-    std::vector<std::vector<float>> padding(level_count);
-    for (std::size_t j = 0; j < level_count; ++j) {
-      const std::size_t k = params.level + j;
-      columns[j] = columns_at(surface.levels[k], edited.levels[k], begin);
-      if (j > 0) columns[j].detail = detail_at(surface.detail[k - 1], begin, end, padding[j]);
+  const auto deform_kernel = POINTWRIGHT_KERNEL(deform_samples);
+  const auto raise_kernel = POINTWRIGHT_KERNEL(raise_level);
+  const auto turn_kernel = POINTWRIGHT_KERNEL(turn_normals);
+  const Mat3d rotation = plan.rigid_only() ? whole_rotation(params.deformation) : Mat3d::Identity();
+  const DeformArgs deform = deform_args(map, plan.moving(), field, surface.levels[plan.level()],
+                                        edited.levels[plan.level()], plan.shape());
+  parallel_for(
+      plan.moving().size(), [&](std::size_t begin, std::size_t end) { deform_kernel(deform, begin, end); },
+      kBlocksOfRange);
+
+  // A level's normals need its neighbours' positions; the next level's positions need its own normals only:
+  // both in one pass over the samples.
+  for (std::size_t k = plan.level(); k < surface.levels.size(); ++k) {
+    const bool finest = k == surface.band_count();
+    const bool carries = k > plan.level();
+    LastBlock last(finest ? std::vector<float>{} : surface.detail[k]);
+    for (const bool bends : {true, false}) {
+      const std::vector<std::uint32_t>& blocks = bends ? plan.bending() : plan.rigid();
+      const RaiseArgs raise =
+          finest ? RaiseArgs{} : raise_args(surface, k, blocks, params, field, edited, last);
+      const TurnArgs turn = carries && plan.rigid_only() ? turn_args(surface.levels[k].normal, blocks,
+                                                                     rotation, field, edited.levels[k].normal)
+                                                         : TurnArgs{};
+      const NormalStencil::Moved moved = carries ? moved_level(surface, k, edited) : NormalStencil::Moved{};
+      parallel_for(
+          blocks.size(),
+          [&](std::size_t begin, std::size_t end) {
+            if (carries && bends) plan.stencil(k).carry(moved, begin, end);
+            if (carries && plan.rigid_only()) turn_kernel(turn, begin, end);
+            if (!finest) raise_kernel(raise, begin, end);
+          },
+          kBlocksOfRange);
     }
-    kernel(DeformJob{.map = &map,
-                     .t = field.t.data() + begin,
-                     .gradient = {field.gradient.x() + begin, field.gradient.y() + begin,
-                                  field.gradient.z() + begin},
-                     .level = columns.data(),
-                     .level_count = level_count},
-           padded_to_block(end - begin));
-  });
+    if (!finest) last.copy_to(edited.detail[k]);
+  }
 }
 
-MultiresSurface apply_edit(const MultiresSurface& surface, const EditParams& params, const ScaleField& field,
-                           const Vec3d& origin) {
-  MultiresSurface edited;
-  apply_edit(surface, params, field, origin, edited);
+MultiresSurface apply_edit(const MultiresSurface& surface, const NeighborGraph& graph,
+                           const EditParams& params, const ScaleField& field, const Vec3d& origin) {
+  MultiresSurface edited = surface;
+  apply_edit(surface, EditPlan(surface, graph, params, field), params, field, origin, edited);
   return edited;
 }
 

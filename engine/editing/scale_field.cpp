@@ -1,6 +1,8 @@
 #include "engine/editing/scale_field.h"
 
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
@@ -9,19 +11,31 @@
 namespace pointwright {
 
 float blend_value(Blend blend, float x) {
+  const float s = 1.0F - x;
   switch (blend) {
-    case Blend::kQuartic: {
-      const float root = (1.0F - x) * (1.0F + x);
-      return root * root;
-    }
+    case Blend::kQuartic:
+      return s * (1.0F + x) * s * (1.0F + x);
+    case Blend::kCubic:
+      return s * s * (1.0F + 2.0F * x);
+    case Blend::kQuintic:
+      return s * s * s * (1.0F + 3.0F * x + 6.0F * x * x);
+    case Blend::kCosine:
+      return 0.5F * (1.0F + std::cos(std::numbers::pi_v<float> * x));
   }
   POINTWRIGHT_CHECK(false, "a known blend");
 }
 
 float blend_slope(Blend blend, float x) {
+  const float s = 1.0F - x;
   switch (blend) {
     case Blend::kQuartic:
-      return -4.0F * x * (1.0F - x) * (1.0F + x);
+      return -4.0F * x * s * (1.0F + x);
+    case Blend::kCubic:
+      return -6.0F * x * s;
+    case Blend::kQuintic:
+      return -30.0F * x * x * s * s;
+    case Blend::kCosine:
+      return -0.5F * std::numbers::pi_v<float> * std::sin(std::numbers::pi_v<float> * x);
   }
   POINTWRIGHT_CHECK(false, "a known blend");
 }
@@ -55,15 +69,28 @@ void region_distances(const RegionPair& regions, const Points& position, std::si
   regions.one.distances(position, begin, end, one, &limits);
 }
 
+void (*blend_kernel(Blend blend))(const ScaleBlend&, std::size_t) {
+  switch (blend) {
+    case Blend::kQuartic:
+      return POINTWRIGHT_KERNEL(blend_quartic);
+    case Blend::kCubic:
+      return POINTWRIGHT_KERNEL(blend_cubic);
+    case Blend::kQuintic:
+      return POINTWRIGHT_KERNEL(blend_quintic);
+    case Blend::kCosine:
+      return POINTWRIGHT_KERNEL(blend_cosine);
+  }
+  POINTWRIGHT_CHECK(false, "a known blend");
+}
+
 }  // namespace
 
 ScaleField compute_scale_field(const Points& position, const RegionPair& regions, Blend blend,
                                const ExecutionContext* context) {
   POINTWRIGHT_CHECK(!regions.zero.empty() && !regions.one.empty(), "both regions hold a ball");
-  POINTWRIGHT_CHECK(blend == Blend::kQuartic, "a known blend");
   const std::size_t n = position.size();
   ScaleField field{.t = std::vector<float>(padded_to_block(n)), .gradient = Points(n)};
-  const auto blend_block = POINTWRIGHT_KERNEL(blend_quartic);
+  const auto blend_block = blend_kernel(blend);
   parallel_for(
       n,
       [&](std::size_t begin, std::size_t end) {

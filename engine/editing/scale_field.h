@@ -11,7 +11,10 @@ namespace pointwright {
 
 /// Blending functions on [0, 1] with beta(0) = 1, beta(1) = 0 and zero slope at both ends.
 enum class Blend {
-  kQuartic,  ///< the paper's beta(x) = (x^2 - 1)^2
+  kQuartic,  ///< the paper's beta(x) = (x^2 - 1)^2: steepest near the zero-region's side of the middle
+  kCubic,    ///< (1 - x)^2 (1 + 2 x): the same both ways
+  kQuintic,  ///< (1 - x)^3 (1 + 3 x + 6 x^2): no curvature at the ends either
+  kCosine,   ///< (1 + cos(pi x)) / 2
 };
 
 /// beta(x) and beta'(x), x in [0, 1].

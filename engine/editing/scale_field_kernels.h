@@ -26,5 +26,8 @@ struct ScaleBlend {
 
 }  // namespace pointwright
 
-/// t and grad t of entries [0, count), count a multiple of 16, with the quartic blend.
+/// t and grad t of entries [0, count), count a multiple of 16, with each of the blends.
 POINTWRIGHT_DECLARE_KERNEL(void blend_quartic(const ScaleBlend& columns, std::size_t count))
+POINTWRIGHT_DECLARE_KERNEL(void blend_cubic(const ScaleBlend& columns, std::size_t count))
+POINTWRIGHT_DECLARE_KERNEL(void blend_quintic(const ScaleBlend& columns, std::size_t count))
+POINTWRIGHT_DECLARE_KERNEL(void blend_cosine(const ScaleBlend& columns, std::size_t count))

@@ -53,17 +53,21 @@ std::size_t NormalStencil::memory() const {
          (blocks_.size() + unit_u_.size() + unit_v_.size() + tilt_u_.size() + tilt_v_.size()) * sizeof(float);
 }
 
+StencilColumns NormalStencil::columns() const {
+  return {.weight_u = weight_u_.data(),
+          .weight_v = weight_v_.data(),
+          .unit_u = unit_u_.data(),
+          .unit_v = unit_v_.data(),
+          .tilt_u = tilt_u_.data(),
+          .tilt_v = tilt_v_.data()};
+}
+
 void NormalStencil::carry(const Moved& moved, std::size_t begin, std::size_t end) const {
   CarryNormalsArgs args{.neighbors = graph_->lanes.data(),
                         .graph_k = graph_->k,
                         .k = k_,
                         .blocks = blocks_.data(),
-                        .stencil = {.weight_u = weight_u_.data(),
-                                    .weight_v = weight_v_.data(),
-                                    .unit_u = unit_u_.data(),
-                                    .unit_v = unit_v_.data(),
-                                    .tilt_u = tilt_u_.data(),
-                                    .tilt_v = tilt_v_.data()}};
+                        .stencil = columns()};
   columns_of(moved.rest->position, args.rest_position);
   columns_of(moved.rest->normal, args.rest_normal);
   columns_of(*moved.position, args.position);
@@ -73,6 +77,18 @@ void NormalStencil::carry(const Moved& moved, std::size_t begin, std::size_t end
   args.normal[1] = moved.normal->y();
   args.normal[2] = moved.normal->z();
   POINTWRIGHT_KERNEL(carry_normals)(args, begin, end);
+}
+
+void NormalStencil::shape_operators(const Points& normal, float* uu, float* uv, float* vv, std::size_t begin,
+                                    std::size_t end) const {
+  ShapeOperatorArgs args{.neighbors = graph_->lanes.data(),
+                         .graph_k = graph_->k,
+                         .k = k_,
+                         .blocks = blocks_.data(),
+                         .stencil = columns(),
+                         .shape = {uu, uv, vv}};
+  columns_of(normal, args.normal);
+  POINTWRIGHT_KERNEL(shape_operators)(args, begin, end);
 }
 
 }  // namespace pointwright

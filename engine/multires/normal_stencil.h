@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/core/execution_context.h"
+#include "engine/multires/normal_stencil_kernels.h"
 #include "engine/multires/surface.h"
 #include "engine/spatial/neighbor_graph.h"
 
@@ -47,7 +48,14 @@ class NormalStencil {
   /// Determinism: bitwise equal for any instruction set
   void carry(const Moved& moved, std::size_t begin, std::size_t end) const;
 
+  /// dn/dp of the samples of those blocks, in the frames of their normals, into padded columns of N
+  /// (engine/multires/shape_operator.h is the whole of it).
+  void shape_operators(const Points& normal, float* uu, float* uv, float* vv, std::size_t begin,
+                       std::size_t end) const;
+
  private:
+  [[nodiscard]] StencilColumns columns() const;
+
   const NeighborGraph* graph_ = nullptr;
   std::uint32_t k_ = 0;
   std::vector<std::uint32_t> blocks_;

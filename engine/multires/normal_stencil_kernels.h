@@ -45,6 +45,16 @@ struct CarryNormalsArgs {
   float* normal[3];
 };
 
+struct ShapeOperatorArgs {
+  const float* normal[3];
+  const std::uint32_t* neighbors;
+  std::uint32_t graph_k;
+  std::uint32_t k;
+  const std::uint32_t* blocks;
+  StencilColumns stencil;
+  float* shape[3];  ///< uu, uv, vv
+};
+
 }  // namespace pointwright
 
 /// Weights and tilts of blocks[begin] .. blocks[end - 1].
@@ -53,3 +63,6 @@ POINTWRIGHT_DECLARE_KERNEL(void build_stencil(const BuildStencilArgs& args, std:
 /// Normals of the samples of blocks[begin] .. blocks[end - 1].
 POINTWRIGHT_DECLARE_KERNEL(void carry_normals(const CarryNormalsArgs& args, std::size_t begin,
                                               std::size_t end))
+/// dn/dp of the samples of blocks[begin] .. blocks[end - 1], in the frames of their normals.
+POINTWRIGHT_DECLARE_KERNEL(void shape_operators(const ShapeOperatorArgs& args, std::size_t begin,
+                                                std::size_t end))

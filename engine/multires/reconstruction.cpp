@@ -13,8 +13,6 @@
 namespace pointwright {
 namespace {
 
-constexpr float kGreatestGain = 16.0F;
-
 // Positions of the level above `k`, from where level k has moved to.
 void rebuild_positions(const MultiresSurface& rest, std::size_t k, float gain, const Level& base,
                        Level& above, const ExecutionContext* context) {

@@ -11,6 +11,9 @@
 
 namespace pointwright {
 
+/// Of a band's detail, either way.
+inline constexpr float kGreatestGain = 16.0F;
+
 /// Where the normals of rebuilt levels come from.
 enum class RebuiltNormals {
   /// Each rest normal is carried by how its neighbourhood has moved: a linear gradient stencil over the rest

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/multires/reconstruction.h"
 #include "protocol/frames/frame.h"
 #include "protocol/json/reader.h"
 
@@ -16,8 +17,12 @@ constexpr std::size_t kMaxVertices = 100'000;
 
 constexpr std::array<std::string_view, 5> kShapeNames{"sphere", "stroke", "box", "half_space", "all"};
 constexpr std::array<std::string_view, 4> kPaintModeNames{"add", "remove", "intersect", "set"};
-constexpr std::array<std::string_view, 2> kDeformationNames{"translation", "rotation"};
-constexpr std::array<std::string_view, 1> kBlendNames{"quartic"};
+// In the order of ElementaryDeformation; a composition of several comes last.
+constexpr std::array<std::string_view, 7> kDeformationNames{
+    "translation", "along_normal", "toward_point", "rotation", "scale", "twist", "sequence"};
+constexpr std::size_t kSequence = kDeformationNames.size() - 1;
+static_assert(std::variant_size_v<ElementaryDeformation> == kSequence);
+constexpr std::array<std::string_view, 4> kBlendNames{"quartic", "cubic", "quintic", "cosine"};
 
 Vec3d required_vec3(ObjectReader& object, std::string_view name) {
   const Json* const member = object.required(name);
@@ -98,16 +103,44 @@ PaintOperation read_paint_operation(const Json& value, const std::string& pointe
   return operation;
 }
 
-Rotation read_rotation(ObjectReader& object) {
-  Rotation rotation;
-  if (const Json* const axis = object.required("axis")) {
-    ObjectReader axis_object(*axis, object.pointer_to("axis"), object.errors());
-    rotation.point = required_vec3(axis_object, "point");
-    rotation.axis = required_vec3(axis_object, "direction");
+struct Axis {
+  Vec3d point = Vec3d::Zero();
+  Vec3d direction = Vec3d::UnitZ();
+};
+
+Axis required_axis(ObjectReader& object) {
+  Axis axis;
+  if (const Json* const member = object.required("axis")) {
+    ObjectReader axis_object(*member, object.pointer_to("axis"), object.errors());
+    axis.point = required_vec3(axis_object, "point");
+    axis.direction = required_vec3(axis_object, "direction");
     axis_object.finish();
   }
-  rotation.angle_rad = to_radians(required_number(object, "angle_deg"));
-  return rotation;
+  return axis;
+}
+
+ElementaryDeformation read_elementary(ObjectReader& object, std::size_t type) {
+  const std::string_view name = kDeformationNames[type];
+  if (name == "along_normal") return NormalOffset{.distance = required_number(object, "distance")};
+  if (name == "toward_point")
+    return TowardPoint{.target = required_vec3(object, "target"),
+                       .amount = required_number(object, "amount")};
+  if (name == "rotation") {
+    const Axis axis = required_axis(object);
+    return Rotation{.point = axis.point,
+                    .axis = axis.direction,
+                    .angle_rad = to_radians(required_number(object, "angle_deg"))};
+  }
+  if (name == "scale")
+    return Scaling{.center = required_vec3(object, "center"), .factors = required_vec3(object, "factors")};
+  if (name == "twist") {
+    const Axis axis = required_axis(object);
+    return Twist{.point = axis.point,
+                 .axis = axis.direction,
+                 .angle_rad = to_radians(required_number(object, "angle_deg")),
+                 .length = required_number(object, "length")};
+  }
+  return Translation{.vector = required_vec3(object, "vector")};
 }
 
 Deformation read_deformation(const Json& value, const std::string& pointer, JsonErrors& errors) {
@@ -115,10 +148,24 @@ Deformation read_deformation(const Json& value, const std::string& pointer, Json
   Deformation deformation;
   const auto type = required_choice(object, "type", kDeformationNames);
   if (!type) return deformation;
-  if (kDeformationNames[*type] == "translation") {
-    deformation = Translation{.vector = required_vec3(object, "vector")};
-  } else {
-    deformation = read_rotation(object);
+  if (*type != kSequence) {
+    deformation = read_elementary(object, *type);
+    object.finish();
+    return deformation;
+  }
+  deformation.steps.clear();
+  if (const Json* const steps = object.required("steps")) {
+    const std::string place = object.pointer_to("steps");
+    if (const Json* const array = read_array(*steps, place, errors, 1, kMaxDeformationSteps)) {
+      for (std::size_t i = 0; i < array->size(); ++i) {
+        ObjectReader step((*array)[i], child_pointer(place, i), errors);
+        const std::span<const std::string_view> elementary(kDeformationNames.data(), kSequence);
+        const auto kind = required_choice(step, "type", elementary);
+        if (!kind) continue;
+        deformation.steps.push_back(read_elementary(step, *kind));
+        step.finish();
+      }
+    }
   }
   object.finish();
   return deformation;
@@ -143,6 +190,16 @@ EditParams read_edit_members(ObjectReader& object) {
     edit.deformation = read_deformation(*deformation, object.pointer_to("deformation"), errors);
     if (errors.fault_count == faults_before)
       add_verdict(validate(edit.deformation), object.pointer(), errors);
+  }
+  if (const Json* const gains = object.optional("gains")) {
+    const std::string place = object.pointer_to("gains");
+    if (const Json* const array = read_array(*gains, place, errors, 1, kMaxBands)) {
+      for (std::size_t i = 0; i < array->size(); ++i) {
+        const auto gain = read_number((*array)[i], child_pointer(place, i), errors,
+                                      {.min = double{-kGreatestGain}, .max = double{kGreatestGain}});
+        edit.gains.push_back(static_cast<float>(gain.value_or(1.0)));
+      }
+    }
   }
   return edit;
 }
@@ -276,21 +333,56 @@ JsonDocument to_json(const PaintOperation& operation) {
   return document;
 }
 
-JsonDocument to_json(const Deformation& deformation) {
-  JsonDocument document{{"type", kDeformationNames[deformation.index()]}};
-  if (const auto* translation = std::get_if<Translation>(&deformation)) {
-    document["vector"] = to_json(translation->vector);
-  } else if (const auto* rotation = std::get_if<Rotation>(&deformation)) {
-    document["axis"] =
-        JsonDocument{{"point", to_json(rotation->point)}, {"direction", to_json(rotation->axis)}};
-    document["angle_deg"] = to_degrees(rotation->angle_rad);
-  }
+namespace {
+
+JsonDocument axis_to_json(const Vec3d& point, const Vec3d& direction) {
+  return {{"point", to_json(point)}, {"direction", to_json(direction)}};
+}
+
+void put_members(const Translation& translation, JsonDocument& document) {
+  document["vector"] = to_json(translation.vector);
+}
+void put_members(const NormalOffset& offset, JsonDocument& document) {
+  document["distance"] = offset.distance;
+}
+void put_members(const TowardPoint& toward, JsonDocument& document) {
+  document["target"] = to_json(toward.target);
+  document["amount"] = toward.amount;
+}
+void put_members(const Rotation& rotation, JsonDocument& document) {
+  document["axis"] = axis_to_json(rotation.point, rotation.axis);
+  document["angle_deg"] = to_degrees(rotation.angle_rad);
+}
+void put_members(const Scaling& scaling, JsonDocument& document) {
+  document["center"] = to_json(scaling.center);
+  document["factors"] = to_json(scaling.factors);
+}
+void put_members(const Twist& twist, JsonDocument& document) {
+  document["axis"] = axis_to_json(twist.point, twist.axis);
+  document["angle_deg"] = to_degrees(twist.angle_rad);
+  document["length"] = twist.length;
+}
+
+JsonDocument elementary_to_json(const ElementaryDeformation& one) {
+  JsonDocument document{{"type", kDeformationNames[one.index()]}};
+  std::visit([&](const auto& each) { put_members(each, document); }, one);
   return document;
 }
 
+}  // namespace
+
+JsonDocument to_json(const Deformation& deformation) {
+  if (deformation.steps.size() == 1) return elementary_to_json(deformation.steps.front());
+  JsonDocument steps = JsonDocument::array();
+  for (const ElementaryDeformation& one : deformation.steps) steps.push_back(elementary_to_json(one));
+  return JsonDocument{{"type", kDeformationNames[kSequence]}, {"steps", std::move(steps)}};
+}
+
 JsonDocument to_json(const EditParams& edit) {
-  return JsonDocument{
+  JsonDocument document{
       {"level", edit.level}, {"blend", blend_name(edit.blend)}, {"deformation", to_json(edit.deformation)}};
+  if (!edit.gains.empty()) document["gains"] = edit.gains;
+  return document;
 }
 
 std::string_view blend_name(Blend blend) {
@@ -308,13 +400,18 @@ std::optional<RegionKind> region_of_name(std::string_view name) {
 }
 
 std::string pointer_of_field(std::string_view field) {
-  // The engine speaks of its own members; where a document calls them otherwise, this says so.
+  // The engine speaks of its own members; where the document of a deformation calls them otherwise, this says
+  // so.
   constexpr std::array<std::array<std::string_view, 2>, 3> kRenamed{
-      {{"deformation.axis", "/deformation/axis/direction"},
-       {"deformation.point", "/deformation/axis/point"},
-       {"deformation.angle_rad", "/deformation/angle_deg"}}};
-  for (const auto& [engine, document] : kRenamed) {
-    if (field == engine) return std::string(document);
+      {{".axis", "/axis/direction"}, {".point", "/axis/point"}, {".angle_rad", "/angle_deg"}}};
+  std::string_view renamed;
+  if (field.starts_with("deformation")) {
+    for (const auto& [engine, document] : kRenamed) {
+      if (!field.ends_with(engine)) continue;
+      field.remove_suffix(engine.size());
+      renamed = document;
+      break;
+    }
   }
   std::string pointer;
   if (field.empty()) return pointer;
@@ -326,7 +423,7 @@ std::string pointer_of_field(std::string_view field) {
       pointer += c;
     }
   }
-  return pointer;
+  return pointer.append(renamed);
 }
 
 bool is_valid_name(std::string_view name) {

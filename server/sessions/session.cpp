@@ -86,6 +86,7 @@ void Session::finish_building(Result<Hierarchy> built) {
     radius->push_back(protocol::to_bfloat16(value));
   rest_.splat_radius = std::move(radius);
   rest_.spacing = std::move(hierarchy.spacing);
+  rest_.graph = std::make_shared<const NeighborGraph>(std::move(hierarchy.graph));
   median_spacing_ = median(rest_.spacing);
   SurfaceState state{
       .surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
@@ -293,10 +294,18 @@ Outcome<SurfaceState> Session::compute(const EditParams& params) {
   auto field = ensure_field(params.level, params.blend);
   if (!field.ok()) return field.problem();
   const SharedDocument now = document();
-  if (last_preview_ && last_preview_->base == *field_key_ && same_params(last_preview_->params, params))
+  if (last_preview_ && last_preview_->base == *field_key_ && last_preview_->params == params)
     return last_preview_->after;
   const auto begin = SteadyClock::now();
-  SurfaceState after = edited(rest_, now->surface, params, *field.value());
+  last_preview_.reset();  // its surface may be written over
+  if (drag_ == nullptr || !drag_->serves(now->surface, field.value(), params)) {
+    drag_.reset();
+    drag_ = std::make_unique<Drag>(rest_, now->surface, field.value(), params);
+    note_time("plan", begin);
+  }
+  SurfaceState after{.surface = drag_->frame(params),
+                     .reports = now->surface.reports,
+                     .first_valid_level = std::max(now->surface.first_valid_level, params.level)};
   note_time("edit", begin);
   last_preview_ = LastPreview{.base = *field_key_, .params = params, .after = after};
   return after;

@@ -13,6 +13,7 @@
 #include "server/sessions/compute_pool.h"
 #include "server/sessions/display.h"
 #include "server/sessions/document.h"
+#include "server/sessions/drag.h"
 #include "server/sessions/feed.h"
 
 namespace pointwright::server {
@@ -177,6 +178,7 @@ class Session : public std::enable_shared_from_this<Session> {
     SurfaceState after;
   };
   std::optional<LastPreview> last_preview_;
+  std::unique_ptr<Drag> drag_;
 
   mutable std::mutex field_mutex_;  // guards the next three, which only the strand writes
   std::optional<FieldKey> field_key_;

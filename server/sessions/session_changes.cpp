@@ -110,6 +110,7 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, Expected e
     const auto computed = compute(params);
     if (!computed.ok()) return computed.problem();
     last_preview_.reset();
+    drag_.reset();  // the surface that it moved is the past
     auto record = std::make_shared<RecordedEdit>();
     record->index = before->head + 1;
     record->params = params;

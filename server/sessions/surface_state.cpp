@@ -75,7 +75,7 @@ Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const 
 SurfaceState edited(const RestModel& rest, const SurfaceState& state, const EditParams& params,
                     const ScaleField& field) {
   return SurfaceState{.surface = std::make_shared<const MultiresSurface>(
-                          apply_edit(*state.surface, params, field, rest.cloud->origin)),
+                          apply_edit(*state.surface, *rest.graph, params, field, rest.cloud->origin)),
                       .reports = state.reports,
                       .first_valid_level = std::max(state.first_valid_level, params.level)};
 }
@@ -98,16 +98,6 @@ std::size_t count_moved(const MultiresSurface& before, const MultiresSurface& af
       if (a.position[i] != b.position[i] || a.normal[i] != b.normal[i]) ++moved;
     return moved;
   });
-}
-
-bool same_params(const EditParams& a, const EditParams& b) {
-  if (a.level != b.level || a.blend != b.blend || a.deformation.index() != b.deformation.index())
-    return false;
-  if (const auto* translation = std::get_if<Translation>(&a.deformation))
-    return translation->vector == std::get<Translation>(b.deformation).vector;
-  const auto& left = std::get<Rotation>(a.deformation);
-  const auto& right = std::get<Rotation>(b.deformation);
-  return left.point == right.point && left.axis == right.axis && left.angle_rad == right.angle_rad;
 }
 
 }  // namespace pointwright::server

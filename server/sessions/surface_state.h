@@ -24,6 +24,7 @@ struct RestModel {
   std::shared_ptr<const Cloud> cloud;
   HierarchyParams params;
   float diagonal = 0.0F;  ///< of the rest cloud: what the scales are fractions of
+  std::shared_ptr<const NeighborGraph> graph;
   std::vector<float> spacing;
   std::shared_ptr<const std::vector<std::uint16_t>> splat_radius;  ///< for viewers: bfloat16, by sample
   HierarchyBuilder build;
@@ -75,8 +76,5 @@ Result<SurfaceState> replayed(const RestModel& rest, const SurfaceState& before,
 
 /// Samples whose finest position or normal differs. Cost: O(N).
 std::size_t count_moved(const MultiresSurface& before, const MultiresSurface& after);
-
-/// Whether two edits ask for the same, to the bit.
-bool same_params(const EditParams& a, const EditParams& b);
 
 }  // namespace pointwright::server

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "engine/multires/normal_stencil.h"
 #include "server/base/random_id.h"
 
 namespace pointwright::server {
@@ -19,6 +20,9 @@ constexpr std::uint64_t kBytesPerBand = 28;
 /// Surfaces of a session that are not in its history: the committed, the previewed, the shown, and one that
 /// is being made.
 constexpr std::uint64_t kLiveSurfaces = 4;
+/// What a drag keeps a sample for each band: the stencils that carry normals. And a sample's neighbours.
+constexpr std::uint64_t kStencilBytes = 4 * NormalStencil::kNeighbors + 16;
+constexpr std::uint64_t kBytesPerNeighbor = 4;
 /// Stored history states that a session may need at most before it thins them out, and the bytes a sample of
 /// one with one band.
 constexpr std::uint64_t kHistoryStates = 32;
@@ -44,7 +48,9 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
                    .errors = {{.pointer = "/cloud", .detail = "no such cloud"}}};
   const std::uint64_t samples = cloud->cloud->size();
   const std::uint64_t more_bands = (request.params.scales.size() - 1) * kBytesPerBand;
-  const std::uint64_t live = samples * (kBytesPerSample + kLiveSurfaces * more_bands);
+  const std::uint64_t drag = request.params.scales.size() * kStencilBytes;
+  const std::uint64_t graph = request.params.neighbors * kBytesPerNeighbor;
+  const std::uint64_t live = samples * (kBytesPerSample + kLiveSurfaces * more_bands + drag + graph);
   const std::uint64_t history =
       std::min(limits_.history_bytes, samples * kHistoryStates * (kStateBytesPerSample + more_bands));
   const std::lock_guard lock(mutex_);

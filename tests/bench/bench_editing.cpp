@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "engine/editing/edit.h"
+#include "engine/editing/edit_plan.h"
 #include "engine/editing/painting.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/synthetic_scan.h"
@@ -79,8 +79,11 @@ void bench_size(BenchReport& report, const Size& size) {
   ScaleField field = compute_scale_field(base.position, regions, Blend::kQuartic);
   for (std::size_t i = 0; i < n; ++i) field.t[i] = 0.5F + 0.5F * field.t[i];
   const EditParams params{.deformation = Rotation{.axis = Vec3d(1.0, 2.0, 3.0), .angle_rad = 1.0}};
-  MultiresSurface edited;
-  report.time(name("edit.level0"), "ms", items, [&] { apply_edit(surface, params, field, origin, edited); });
+  const NeighborGraph graph = build_neighbor_graph(finest.position, 10);
+  const EditPlan plan(surface, graph, params, field);
+  MultiresSurface edited = surface;
+  report.time(name("edit.level0"), "ms", items,
+              [&] { apply_edit(surface, plan, params, field, origin, edited); });
 }
 
 void bench_region_query(BenchReport& report) {

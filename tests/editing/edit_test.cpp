@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include "engine/editing/edit_plan.h"
 #include "tests/editing/editing_support.h"
 
 namespace pointwright {
@@ -38,9 +39,9 @@ TEST_CASE("a zero deformation is the identity on every level, to the bit") {
     for (const Deformation& nothing :
          {Deformation(Translation{}),
           Deformation(Rotation{.axis = Vec3d(1.0, 1.0, 0.0), .angle_rad = 0.0})}) {
-      const MultiresSurface edited =
-          apply_edit(surface, {.level = level, .deformation = nothing}, field, Vec3d(5.0, 6.0, 7.0));
-      CHECK(test::same_bytes(edited, surface));
+      const MultiresSurface after =
+          test::edited(surface, {.level = level, .deformation = nothing}, field, Vec3d(5.0, 6.0, 7.0));
+      CHECK(test::same_bytes(after, surface));
     }
   }
 }
@@ -53,20 +54,20 @@ TEST_CASE("samples with t = 0 keep their bits on every level; coarser levels sta
     params.level = level;
     const RegionPair regions = regions_beside(surface.levels[level], 0.3F, 0.05F);
     const ScaleField field = compute_scale_field(surface.levels[level].position, regions, Blend::kQuartic);
-    const MultiresSurface edited = apply_edit(surface, params, field, Vec3d::Zero());
+    const MultiresSurface after = test::edited(surface, params, field, Vec3d::Zero());
     std::size_t moved = 0;
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < surface.sample_count(); ++i) {
       for (std::size_t k = 0; k <= 2; ++k) {
-        const bool same = test::same_sample(edited.levels[k].position, surface.levels[k].position, i) &&
-                          test::same_sample(edited.levels[k].normal, surface.levels[k].normal, i);
+        const bool same = test::same_sample(after.levels[k].position, surface.levels[k].position, i) &&
+                          test::same_sample(after.levels[k].normal, surface.levels[k].normal, i);
         if (field.t[i] == 0.0F || k < level) wrong += !same;
       }
-      moved += field.t[i] > 0.0F && edited.finest().position[i] != surface.finest().position[i];
+      moved += field.t[i] > 0.0F && after.finest().position[i] != surface.finest().position[i];
     }
     CHECK(wrong == 0);
     CHECK(moved > 2000);
-    CHECK(edited.detail == surface.detail);
+    CHECK(after.detail == surface.detail);
   }
 }
 
@@ -82,8 +83,8 @@ TEST_CASE("a rigid motion of everything is reproduced to 1e-6 of the diagonal, n
     rotation.point += origin;
     Rotation turn_only = rotation;
     turn_only.point = Vec3d::Zero();
-    const MultiresSurface edited =
-        apply_edit(surface, {.deformation = rotation}, test::constant_field(4000, 1.0F), origin);
+    const MultiresSurface after =
+        test::edited(surface, {.deformation = rotation}, test::constant_field(4000, 1.0F), origin);
     double position_error = 0.0;
     double normal_error = 0.0;
     for (std::size_t k = 0; k <= 2; ++k) {
@@ -92,8 +93,8 @@ TEST_CASE("a rigid motion of everything is reproduced to 1e-6 of the diagonal, n
             deform_point(rotation, origin + surface.levels[k].position[i].cast<double>(), 1.0) - origin;
         const Vec3d turned = deform_point(turn_only, surface.levels[k].normal[i].cast<double>(), 1.0);
         position_error =
-            std::max(position_error, (edited.levels[k].position[i].cast<double>() - expected).norm());
-        normal_error = std::max(normal_error, (edited.levels[k].normal[i].cast<double>() - turned).norm());
+            std::max(position_error, (after.levels[k].position[i].cast<double>() - expected).norm());
+        normal_error = std::max(normal_error, (after.levels[k].normal[i].cast<double>() - turned).norm());
       }
     }
     CHECK(position_error < 1e-6 * diagonal);
@@ -106,9 +107,9 @@ TEST_CASE("an edit followed by its inverse returns the rigid part within roundin
   const RegionPair regions = regions_beside(surface.levels[0], 0.3F, 0.05F);
   const ScaleField field = compute_scale_field(surface.levels[0].position, regions, Blend::kQuartic);
   Rotation rotation{.point = Vec3d(0.3, 0.0, 0.0), .axis = Vec3d(0.0, 1.0, 0.2), .angle_rad = 2.0};
-  const MultiresSurface there = apply_edit(surface, {.deformation = rotation}, field, Vec3d::Zero());
+  const MultiresSurface there = test::edited(surface, {.deformation = rotation}, field, Vec3d::Zero());
   rotation.angle_rad = -2.0;
-  const MultiresSurface back = apply_edit(there, {.deformation = rotation}, field, Vec3d::Zero());
+  const MultiresSurface back = test::edited(there, {.deformation = rotation}, field, Vec3d::Zero());
   float error = 0.0F;
   for (std::size_t i = 0; i < 4000; ++i) {
     if (field.t[i] != 1.0F && field.t[i] != 0.0F) continue;
@@ -128,7 +129,7 @@ NormalCheck compare_normals(const Level& base, const RegionPair& regions, const 
                             const std::function<Vec3d(const Vec3d&)>& project) {
   const ScaleField field = compute_scale_field(base.position, regions, Blend::kQuartic);
   const MultiresSurface surface{.levels = {base}, .detail = {}};
-  const MultiresSurface edited = apply_edit(surface, {.deformation = deformation}, field, Vec3d::Zero());
+  const MultiresSurface after = test::edited(surface, {.deformation = deformation}, field, Vec3d::Zero());
   NormalCheck check;
   for (std::size_t i = 7; i < base.position.size(); i += 23) {
     if (field.t[i] <= 0.0F) continue;
@@ -138,7 +139,7 @@ NormalCheck compare_normals(const Level& base, const RegionPair& regions, const 
     const Vec3d narrow = test::reference_normal(regions, deformation, p, n, 2e-5, project);
     if ((wide - narrow).norm() > 1e-3) continue;  // on a medial line, where t has a crease
     ++check.compared;
-    check.worst = std::max(check.worst, (narrow - edited.finest().normal[i].cast<double>()).norm());
+    check.worst = std::max(check.worst, (narrow - after.finest().normal[i].cast<double>()).norm());
   }
   return check;
 }
@@ -172,7 +173,7 @@ TEST_CASE("detail on a bent plane ends where p' = r' + d n' says") {
   const RegionPair regions = regions_beside(plane, 0.4F, 0.03F);
   const ScaleField field = compute_scale_field(plane.position, regions, Blend::kQuartic);
   const Rotation bend{.axis = Vec3d(0.0, -1.0, 0.0), .angle_rad = kPi / 2.0};
-  const MultiresSurface edited = apply_edit(surface, {.deformation = bend}, field, Vec3d::Zero());
+  const MultiresSurface after = test::edited(surface, {.deformation = bend}, field, Vec3d::Zero());
   double error_sq = 0.0;
   double detail_sq = 0.0;
   std::size_t counted = 0;
@@ -183,7 +184,7 @@ TEST_CASE("detail on a bent plane ends where p' = r' + d n' says") {
         test::reference_normal(regions, bend, r, Vec3d::UnitZ(), 1e-5, [](const Vec3d& q) { return q; });
     const Vec3d expected =
         deform_point(bend, r, test::reference_t(regions, r)) + double{surface.detail[0][i]} * n;
-    error_sq += (edited.finest().position[i].cast<double>() - expected).squaredNorm();
+    error_sq += (after.finest().position[i].cast<double>() - expected).squaredNorm();
     detail_sq += double{surface.detail[0][i]} * double{surface.detail[0][i]};
     ++counted;
   }
@@ -196,14 +197,12 @@ TEST_CASE("single-resolution editing deforms the finest level alone") {
   const RegionPair regions = regions_beside(surface.levels[2], 0.3F, 0.07F);
   const ScaleField field = compute_scale_field(surface.levels[2].position, regions, Blend::kQuartic);
   const Translation translation{.vector = Vec3d(0.0, 0.0, 0.5)};
-  const MultiresSurface edited =
-      apply_edit(surface, {.level = 2, .deformation = translation}, field, Vec3d::Zero());
-  Points position;
-  Points normal;
-  deform(translation, Vec3d::Zero(), field, surface.levels[2].position, surface.levels[2].normal, position,
-         normal);
-  CHECK(test::same_bytes(edited.finest().position, position));
-  CHECK(test::same_bytes(edited.finest().normal, normal));
+  const MultiresSurface after =
+      test::edited(surface, {.level = 2, .deformation = translation}, field, Vec3d::Zero());
+  Level alone;
+  deform(translation, Vec3d::Zero(), field, surface.levels[2], alone);
+  CHECK(test::same_bytes(after.finest().position, alone.position));
+  CHECK(test::same_bytes(after.finest().normal, alone.normal));
 }
 
 TEST_CASE("parameters are validated against the surface") {
@@ -219,19 +218,37 @@ TEST_CASE("parameters are validated against the surface") {
   CHECK(axis.error().field == "deformation.axis");
 }
 
-TEST_CASE("reusing a surface's memory gives the same result whatever it held") {
+TEST_CASE("frames of one plan write over each other and come out as if made alone") {
   const MultiresSurface surface = bumpy_sphere(2100);
+  const NeighborGraph graph = build_neighbor_graph(surface.finest().position, 10);
   const RegionPair regions = regions_beside(surface.levels[1], 0.3F, 0.05F);
   const ScaleField field = compute_scale_field(surface.levels[1].position, regions, Blend::kQuartic);
-  const EditParams params{.level = 1, .deformation = Rotation{.angle_rad = 1.0}};
-  const MultiresSurface fresh = apply_edit(surface, params, field, Vec3d::Zero());
-  for (MultiresSurface reused :
-       {bumpy_sphere(2100), bumpy_sphere(30), bumpy_sphere(9000), MultiresSurface{}}) {
-    apply_edit(surface, params, field, Vec3d::Zero(), reused);
-    CHECK(test::same_bytes(reused, fresh));
+  const std::vector<EditParams> drag = {
+      {.level = 1, .deformation = Rotation{.angle_rad = 1.0}},
+      {.level = 1, .deformation = Translation{.vector = Vec3d(0.1, 0.0, 0.3)}},
+      {.level = 1, .deformation = Translation{}},
+      {.level = 1, .deformation = Scaling{.factors = Vec3d(1.0, 2.0, 0.5)}},
+      {.level = 1, .deformation = NormalOffset{.distance = 0.05}},
+      {.level = 1, .deformation = Translation{}, .gains = {1.0F, 0.0F}}};
+  const EditPlan rigid(surface, graph, drag[0], field);
+  const EditPlan bending(surface, graph, {.level = 1, .deformation = NormalOffset{}}, field);
+  CHECK(rigid.rigid().size() + rigid.bending().size() == rigid.moving().size());
+  CHECK(bending.rigid().empty());
+  MultiresSurface reused_rigid = surface;
+  MultiresSurface reused_bending = surface;
+  for (const EditParams& params : drag) {
+    REQUIRE(rigid.serves(params) != bending.serves(params));
+    const EditPlan& plan = rigid.serves(params) ? rigid : bending;
+    MultiresSurface& reused = rigid.serves(params) ? reused_rigid : reused_bending;
+    apply_edit(surface, plan, params, field, Vec3d::Zero(), reused);
+    CHECK(test::same_bytes(reused, test::edited(surface, params, field, Vec3d::Zero())));
   }
+  CHECK(rigid.serves(drag[2]));
+  CHECK_FALSE(rigid.serves({.level = 0}));
   MultiresSurface itself = surface;
-  CHECK_THROWS_AS(apply_edit(itself, params, field, Vec3d::Zero(), itself), LogicError);
+  CHECK_THROWS_AS(apply_edit(itself, rigid, drag[0], field, Vec3d::Zero(), itself), LogicError);
+  MultiresSurface smaller = bumpy_sphere(30);
+  CHECK_THROWS_AS(apply_edit(surface, rigid, drag[0], field, Vec3d::Zero(), smaller), LogicError);
 }
 
 TEST_CASE("an edit gives the same bytes for any thread count, instruction set and number of samples") {
@@ -240,10 +257,10 @@ TEST_CASE("an edit gives the same bytes for any thread count, instruction set an
   const ScaleField field = compute_scale_field(surface.levels[0].position, regions, Blend::kQuartic);
   const EditParams params{.deformation = Rotation{.axis = Vec3d(1.0, 2.0, 3.0), .angle_rad = 4.0}};
   test::for_all_machines(
-      [&] { return apply_edit(surface, params, field, Vec3d::Zero()); },
+      [&] { return test::edited(surface, params, field, Vec3d::Zero()); },
       [](const MultiresSurface& a, const MultiresSurface& b) { CHECK(test::same_bytes(a, b)); });
 
-  const MultiresSurface all = apply_edit(surface, params, field, Vec3d::Zero());
+  const MultiresSurface all = test::edited(surface, params, field, Vec3d::Zero());
   for (const std::size_t n : {0, 1, 15, 16, 17}) {
     MultiresSurface some = surface;
     ScaleField some_field = field;
@@ -254,13 +271,17 @@ TEST_CASE("an edit gives the same bytes for any thread count, instruction set an
     for (auto& column : some.detail) column.resize(n);
     some_field.t.resize(padded_to_block(n));
     some_field.gradient.resize(n);
-    const MultiresSurface edited = apply_edit(some, params, some_field, Vec3d::Zero());
-    REQUIRE(edited.sample_count() == n);
+    const MultiresSurface after = test::edited(some, params, some_field, Vec3d::Zero());
+    REQUIRE(after.sample_count() == n);
+    // Finer normals look at neighbours, which are others among fewer samples.
     for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t k = 0; k <= 2; ++k) {
-        CHECK(test::same_sample(edited.levels[k].position, all.levels[k].position, i));
-        CHECK(test::same_sample(edited.levels[k].normal, all.levels[k].normal, i));
-      }
+      CHECK(test::same_sample(after.levels[0].position, all.levels[0].position, i));
+      CHECK(test::same_sample(after.levels[0].normal, all.levels[0].normal, i));
+      CHECK(test::same_sample(after.levels[1].position, all.levels[1].position, i));
+    }
+    for (const Level& level : after.levels) {
+      CHECK(test::all_finite(level.position));
+      CHECK(test::all_finite(level.normal));
     }
   }
 }

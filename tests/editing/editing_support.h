@@ -116,6 +116,12 @@ inline Vec3d reference_normal(const RegionPair& regions, const Deformation& defo
   return (f(p + h * u) - f(p - h * u)).cross(f(p + h * v) - f(p - h * v)).normalized();
 }
 
+/// The edit over the graph of the finest level's samples.
+inline MultiresSurface edited(const MultiresSurface& surface, const EditParams& params,
+                              const ScaleField& field, const Vec3d& origin) {
+  return apply_edit(surface, build_neighbor_graph(surface.finest().position, 10), params, field, origin);
+}
+
 inline bool same_bytes(const float* a, const float* b, std::size_t n) {
   return n == 0 || std::memcmp(a, b, n * sizeof(float)) == 0;
 }

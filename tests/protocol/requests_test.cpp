@@ -117,12 +117,53 @@ TEST_CASE("edits are read, degrees become radians") {
       parse_edit);
   CHECK(edit.level == 1);
   CHECK(edit.blend == Blend::kQuartic);
-  const auto& rotation = std::get<Rotation>(edit.deformation);
+  REQUIRE(edit.deformation.steps.size() == 1);
+  const auto& rotation = std::get<Rotation>(edit.deformation.steps[0]);
   CHECK(rotation.point == Vec3d(1, 2, 3));
   CHECK(rotation.axis == Vec3d(0, 0, 2));
   CHECK(rotation.angle_rad == -std::numbers::pi / 2);
   CHECK(accepted(R"({"level":0,"deformation":{"type":"translation","vector":[0,0,0]}})", parse_edit).level ==
         0);
+}
+
+TEST_CASE("every kind of deformation is read, checked and written back to the bit") {
+  const std::vector<std::string> documents = {
+      R"({"type":"translation","vector":[0.1,2.0,-3.0]})",
+      R"({"type":"along_normal","distance":-0.25})",
+      R"({"type":"toward_point","target":[1.0,2.0,3.0],"amount":0.5})",
+      R"({"type":"rotation","axis":{"point":[1.0,2.0,3.0],"direction":[0.0,0.0,2.0]},"angle_deg":33.3})",
+      R"({"type":"scale","center":[1.0,0.0,0.0],"factors":[1.0,2.0,0.5]})",
+      R"({"type":"twist","axis":{"point":[0.0,0.0,0.0],"direction":[0.0,1.0,0.0]},"angle_deg":360.0,"length":0.2})",
+      R"({"type":"sequence","steps":[{"type":"along_normal","distance":0.1},{"type":"translation","vector":[0.0,0.0,1.0]}]})"};
+  for (const std::string& document : documents) {
+    CAPTURE(document);
+    const auto edit = accepted(
+        R"({"level":0,"blend":"cosine","deformation":)" + document + R"(,"gains":[0.5,2.0]})", parse_edit);
+    CHECK(to_json(edit.deformation).dump() == document);
+    CHECK(edit.blend == Blend::kCosine);
+    CHECK(edit.gains == std::vector<float>{0.5F, 2.0F});
+    CHECK(accepted(to_json(edit).dump(), parse_edit) == edit);
+  }
+  const auto faults = [](const std::string& deformation) {
+    return refused(R"({"level":0,"deformation":)" + deformation + "}", parse_edit);
+  };
+  CHECK(faults(R"({"type":"bend"})") == Pointers{"/deformation/type"});
+  CHECK(faults(R"({"type":"scale","center":[0,0,0],"factors":[0,1,1]})") == Pointers{"/deformation/factors"});
+  CHECK(faults(R"({"type":"twist","axis":{"point":[0,0,0],"direction":[0,0,0]},"angle_deg":1,"length":1})") ==
+        Pointers{"/deformation/axis/direction"});
+  CHECK(faults(R"({"type":"sequence","steps":[]})") == Pointers{"/deformation/steps"});
+  CHECK(faults(R"({"type":"sequence","steps":[{"type":"sequence","steps":[]}]})") ==
+        Pointers{"/deformation/steps/0/type"});
+  CHECK(
+      faults(
+          R"({"type":"sequence","steps":[{"type":"translation","vector":[0,0,0]},{"type":"rotation","axis":{"point":[0,0,0],"direction":[0,0,1]},"angle_deg":99999}]})") ==
+      Pointers{"/deformation/steps/1/angle_deg"});
+  CHECK(
+      faults(
+          R"({"type":"sequence","steps":[{"type":"translation","vector":[0,0,0]},{"type":"along_normal","distance":1}]})") ==
+      Pointers{"/deformation/steps/1/type"});
+  CHECK(refused(R"({"level":0,"deformation":{"type":"along_normal","distance":1},"gains":[17]})",
+                parse_edit) == Pointers{"/gains/0"});
 }
 
 TEST_CASE("levels, sequences and heads are whole numbers in range") {

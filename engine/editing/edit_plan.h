@@ -1,0 +1,54 @@
+#pragma once
+// What the frames of a drag share: which blocks of samples move, and the stencils that carry their normals.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/core/execution_context.h"
+#include "engine/editing/edit.h"
+#include "engine/multires/normal_stencil.h"
+#include "engine/multires/shape_operator.h"
+
+namespace pointwright {
+
+/// Made once the regions or the surface change, not per frame. Immutable; the surface, the graph and the field
+/// that it was made of must outlive it and stay as they were.
+class EditPlan {
+ public:
+  /// Of `params`, the level, the kinds of deformation and whether there are gains count, not their amounts.
+  /// Cost:    O(N k) a level finer than params.level, parallel; 4 k + 16 bytes a sample that may bend, a level
+  /// Cancels: between blocks; the plan is then incomplete and must be dropped
+  EditPlan(const MultiresSurface& surface, const NeighborGraph& graph, const EditParams& params,
+           const ScaleField& field, const ExecutionContext* context = nullptr);
+
+  /// Whether edits with these parameters can be made from this plan. All plans that serve the same parameters
+  /// make the same bits of them.
+  [[nodiscard]] bool serves(const EditParams& params) const;
+  [[nodiscard]] std::uint32_t level() const { return level_; }
+  /// Whether it serves rigid motions of the one-region alone, with gains 1.
+  [[nodiscard]] bool rigid_only() const { return rigid_only_; }
+  [[nodiscard]] std::size_t memory() const;
+
+  /// Blocks of kSimdBlock samples, ascending: all that may move; of these, those that may bend; and those that
+  /// move as one rigid body with all their samples (t = 1 without a gradient), where nothing else is asked for.
+  [[nodiscard]] const std::vector<std::uint32_t>& moving() const { return moving_; }
+  [[nodiscard]] const std::vector<std::uint32_t>& bending() const { return bending_; }
+  [[nodiscard]] const std::vector<std::uint32_t>& rigid() const { return rigid_; }
+  /// Over bending(). Pre: level() < level <= the finest.
+  [[nodiscard]] const NormalStencil& stencil(std::size_t level) const {
+    return stencils_[level - level_ - 1];
+  }
+  /// Of the edited level; null where no deformation that the plan serves needs them.
+  [[nodiscard]] const ShapeOperators* shape() const { return shape_.size() > 0 ? &shape_ : nullptr; }
+
+ private:
+  std::uint32_t level_;
+  bool rigid_only_;
+  bool offsets_;
+  std::vector<std::uint32_t> moving_, bending_, rigid_;
+  std::vector<NormalStencil> stencils_;
+  ShapeOperators shape_;
+};
+
+}  // namespace pointwright
