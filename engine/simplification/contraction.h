@@ -20,45 +20,67 @@ namespace pointwright {
 struct alignas(64) ContractionNode {
   float fields[kNodeFloats];
 };
+/// And its neighbours.
+struct alignas(64) ContractionRow {
+  std::uint32_t neighbor[kRowNeighbors];
+};
 
 /// Neighbours that a sample brings along at most; a contracted one keeps kRowNeighbors.
 inline constexpr std::uint32_t kStartNeighbors = 12;
 
-struct ContractionPair {
-  std::uint32_t first = 0;  ///< first < second
-  std::uint32_t second = 0;
-  float cost = 0.0F;
-};
-
 /// When to stop, and what a pair may cost; lengths in the nodes' scale.
 struct ContractionGoal {
-  std::size_t count = 1;                                 ///< samples to be left
-  float limit = std::numeric_limits<float>::infinity();  ///< of the quadric part
-  float length_weight = 0.0F;
-  bool separate_sheets = true;
+  std::size_t count = 1;  ///< samples to be left
+  PairCost rule{.length_weight = 0.0F,
+                .limit = std::numeric_limits<float>::infinity(),
+                .separate_sheets = true};
 };
 
-/// The contractions as they were made. Both orders fill it; finish_simplification() brings it in order of
-/// cost.
+/// The contractions as they were made. Both orders fill it; simplify() brings it in order of cost.
 struct ContractionLog {
-  struct State {
-    float position[3];
+  struct alignas(64) Step {  // a cache line: the order of cost is as good as random
+    Contraction contraction;  ///< its error in the nodes' scale
+    float cost;               ///< never less than those of the steps that it builds on
+    float position[3];        ///< of the survivor
     float normal[3];
+    std::uint32_t neighbor_count;
+    std::uint64_t first_neighbor;
   };
-  struct Row {
-    std::uint32_t chunk = 0;
-    std::uint32_t first = 0;
-    std::uint32_t count = 0;
-  };
-  std::vector<Contraction> steps;  ///< errors in the nodes' scale
-  std::vector<float> cost;         ///< of each step, never less than those of the steps that it builds on
-  std::vector<State> state;        ///< of the survivor
-  std::vector<Row> row;            ///< the survivor's neighbours, in one of the chunks
-  std::vector<std::vector<std::uint32_t>> chunks;
+  std::unique_ptr<Step[]> steps;  ///< not touched, so not resident, beyond the count
+  std::size_t count = 0;
+  std::unique_ptr<std::uint32_t[]> neighbors;  ///< of the survivors
 };
 
-/// The nodes of the samples, and one buffer's worth of kernel calls over them. The scale is a power of two
-/// that brings the cloud's extent near 1, so that squares of squares neither vanish nor overflow.
+/// A column that is rewritten as a whole, again and again, each time for fewer nodes. Padded to whole blocks.
+template <typename T>
+class ShrinkingColumn {
+ public:
+  [[nodiscard]] T* data() { return current_.get(); }
+  [[nodiscard]] const T* data() const { return current_.get(); }
+  /// Room for the next version, without values. It is given back where half of it would do.
+  [[nodiscard]] T* next(std::size_t count) {
+    const std::size_t padded = padded_to_block(count);
+    if (next_size_ < padded || next_size_ > 2 * padded) {
+      next_.reset();
+      next_ = std::make_unique_for_overwrite<T[]>(padded);
+      next_size_ = padded;
+    }
+    return next_.get();
+  }
+  /// The next version becomes the current one.
+  void swap() {
+    current_.swap(next_);
+    std::swap(current_size_, next_size_);
+  }
+
+ private:
+  std::unique_ptr<T[]> current_, next_;
+  std::size_t current_size_ = 0;
+  std::size_t next_size_ = 0;
+};
+
+/// The nodes of the samples, and kernel calls over them. The scale is a power of two that brings the cloud's
+/// extent near 1, so that squares of squares neither vanish nor overflow.
 class ContractionNodes {
  public:
   ContractionNodes(const Points& position, const Points& normal, const NeighborGraph& graph,
@@ -66,21 +88,23 @@ class ContractionNodes {
 
   [[nodiscard]] float scale() const { return scale_; }
   [[nodiscard]] std::size_t count() const { return count_; }
-  [[nodiscard]] const ContractionNode& operator[](std::size_t i) const { return nodes_[i]; }
-  void set(std::size_t i, const ContractionNode& node) { nodes_[i] = node; }
-  /// Leaves the nodes source[0], source[1], ... (ascending), which get the numbers 0, 1, ...
-  void compact(const std::vector<std::uint32_t>& source);
+  [[nodiscard]] const ContractionNode& operator[](std::size_t i) const { return nodes_.data()[i]; }
+  [[nodiscard]] const float* data() const { return nodes_.data()->fields; }
+  void set(std::size_t i, const ContractionNode& node) { nodes_.data()[i] = node; }
+  /// Where to write the nodes that replace these, padding apart, and to have them replaced.
+  [[nodiscard]] ContractionNode* next(std::size_t count) { return nodes_.next(count); }
+  void replace(std::size_t count);
 
   /// Costs of the pairs (first[i], second[i]). The columns have room for whole blocks, the pairs' with valid
   /// indices.
-  void costs(const ContractionGoal& goal, const std::uint32_t* first, const std::uint32_t* second,
+  void costs(const PairCost& rule, const std::uint32_t* first, const std::uint32_t* second,
              std::size_t count, float* cost) const;
-  /// The contracted nodes, which are not stored yet.
-  void contract(std::span<const ContractionPair> pairs, std::vector<ContractionNode>& merged) const;
+  /// The contracted nodes, which are not stored yet; columns as above.
+  void contract(const std::uint32_t* first, const std::uint32_t* second, std::size_t count,
+                ContractionNode* merged) const;
 
  private:
-  std::unique_ptr<ContractionNode[]> nodes_;
-  std::unique_ptr<ContractionNode[]> spare_;  // where compact() writes
+  ShrinkingColumn<ContractionNode> nodes_;
   std::size_t count_ = 0;
   float scale_ = 1.0F;
 };

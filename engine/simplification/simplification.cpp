@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "engine/core/out_of_range.h"
@@ -18,37 +21,54 @@ namespace {
 constexpr std::size_t kMaxSamples = (std::size_t{1} << 27U) - 1;  // node offsets are 31 bits
 constexpr float kMaxLengthWeight = 10.0F;
 
+// Sizes the columns, several at a time: zeroing them is what their first use costs most in.
+void resize_record(ContractionRecord& record, std::size_t steps) {
+  const std::function<void()> columns[] = {[&] { record.steps.resize(steps); },
+                                           [&] { record.position.resize(steps); },
+                                           [&] { record.normal.resize(steps); },
+                                           [&] { record.neighbor_first.resize(steps + 1); }};
+  parallel_for(
+      std::size(columns), [&](std::size_t c, std::size_t) { columns[c](); }, 1);
+}
+
 // The log in order of cost, its first `count` contractions; lengths back in model units.
 ContractionRecord ordered_record(const ContractionLog& log, std::size_t count, float scale) {
-  std::vector<std::uint64_t> keys(log.steps.size());
-  std::vector<std::uint32_t> order(log.steps.size());
-  std::iota(order.begin(), order.end(), 0U);
+  std::vector<std::uint64_t> keys(log.count);
+  std::vector<std::uint32_t> order(log.count);
   // Costs are not negative, so their bits order them; the sort is stable and no step costs less than those
   // that it builds on, which were made before it.
-  for (std::size_t s = 0; s < keys.size(); ++s) keys[s] = std::bit_cast<std::uint32_t>(log.cost[s]);
+  parallel_for(log.count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      keys[s] = std::bit_cast<std::uint32_t>(log.steps[s].cost);
+      order[s] = static_cast<std::uint32_t>(s);
+    }
+  });
   sort_by_key(keys, order);
-  order.resize(count);
   ContractionRecord record;
-  record.steps.resize(count);
-  record.position.resize(count);
-  record.normal.resize(count);
-  record.neighbor_first.assign(count + 1, 0);
-  for (std::size_t s = 0; s < count; ++s) {
-    record.neighbor_first[s + 1] = record.neighbor_first[s] + log.row[order[s]].count;
-  }
-  record.neighbor.resize(record.neighbor_first[count]);
+  resize_record(record, count);
   const float inverse = 1.0F / scale;
+  // The log's lines are anywhere in memory: asked for long before they are read.
+  constexpr std::size_t kAhead = 16;
   parallel_for(count, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
-      const auto& [p, n] = log.state[order[s]];
-      record.steps[s] = log.steps[order[s]];
+      if (s + kAhead < end) __builtin_prefetch(&log.steps[order[s + kAhead]]);
+      const ContractionLog::Step& step = log.steps[order[s]];
+      const float* p = step.position;
+      record.steps[s] = step.contraction;
       record.steps[s].error *= inverse;
       record.position.set(s, {p[0] * inverse, p[1] * inverse, p[2] * inverse});
-      record.normal.set(s, {n[0], n[1], n[2]});
-      const auto& [chunk, first, neighbors] = log.row[order[s]];
-      const auto from = log.chunks[chunk].begin() + first;
-      std::copy(from, from + neighbors,
-                record.neighbor.begin() + static_cast<std::ptrdiff_t>(record.neighbor_first[s]));
+      record.normal.set(s, {step.normal[0], step.normal[1], step.normal[2]});
+      record.neighbor_first[s + 1] = step.neighbor_count;
+      keys[s] = step.first_neighbor;
+    }
+  });
+  std::partial_sum(record.neighbor_first.begin(), record.neighbor_first.end(), record.neighbor_first.begin());
+  record.neighbor.resize(record.neighbor_first[count]);
+  parallel_for(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      if (s + kAhead < end) __builtin_prefetch(&log.neighbors[keys[s + kAhead]]);
+      const std::size_t first = record.neighbor_first[s];
+      std::copy_n(&log.neighbors[keys[s]], record.neighbor_first[s + 1] - first, record.neighbor.data() + first);
     }
   });
   return record;
@@ -117,6 +137,27 @@ void apply_record(const Points& position, const Points& normal, Simplification& 
   if (result.placement == Placement::kOnSurface && !record.steps.empty()) settle(position, normal, result);
 }
 
+// Contractions down to `count` samples, or as far as the parameters let them go; nothing where cancelled.
+std::optional<ContractionRecord> contraction_record(const Points& position, const Points& normal,
+                                                    const NeighborGraph& graph, const SimplifyParams& params,
+                                                    std::size_t count, const ExecutionContext* context) {
+  ContractionLog log;
+  float scale = 1.0F;
+  {  // the log is ordered when the nodes' memory is free again
+    ContractionNodes nodes(position, normal, graph, params.separate_sheets, context);
+    scale = nodes.scale();
+    ContractionGoal goal{.count = count};
+    goal.rule.length_weight = params.length_weight;
+    goal.rule.separate_sheets = params.separate_sheets;
+    if (const auto* within = std::get_if<KeepWithin>(&params.target)) {
+      goal.rule.limit = within->error * scale * (within->error * scale);
+    }
+    const auto contract = params.order == ContractionOrder::kGreedy ? contract_greedily : contract_in_batches;
+    if (!contract(position, graph, goal, nodes, log, context)) return std::nullopt;
+  }
+  return ordered_record(log, std::min(log.count, position.size() - count), scale);
+}
+
 }  // namespace
 
 Result<void> validate(const SimplifyParams& params) {
@@ -154,22 +195,16 @@ Result<Simplification> simplify(const Points& position, const Points& normal, co
   Simplification result{.placement = params.placement};
   result.record.neighbor_first.assign(1, 0);
   if (n == 0) return result;
-  ContractionNodes nodes(position, normal, graph, params.separate_sheets, context);
-  ContractionGoal goal{.length_weight = params.length_weight, .separate_sheets = params.separate_sheets};
-  if (const auto* count = std::get_if<KeepCount>(&params.target)) goal.count = std::min(n, count->count);
+  std::size_t count = 1;
+  if (const auto* keep = std::get_if<KeepCount>(&params.target)) count = std::min(n, keep->count);
   if (const auto* keep = std::get_if<KeepRatio>(&params.target)) {
-    goal.count = std::max<std::size_t>(
+    count = std::max<std::size_t>(
         1, static_cast<std::size_t>(std::llround(keep->ratio * static_cast<double>(n))));
   }
-  if (const auto* within = std::get_if<KeepWithin>(&params.target)) {
-    const float error = within->error * nodes.scale();
-    goal.limit = error * error;
-  }
-  if (goal.count < n) {
-    ContractionLog log;
-    const auto contract = params.order == ContractionOrder::kGreedy ? contract_greedily : contract_in_batches;
-    if (!contract(position, graph, goal, nodes, log, context)) return cancelled_error();
-    result.record = ordered_record(log, std::min(log.steps.size(), n - goal.count), nodes.scale());
+  if (count < n) {
+    auto record = contraction_record(position, normal, graph, params, count, context);
+    if (!record) return cancelled_error();
+    result.record = std::move(*record);
   }
   apply_record(position, normal, result);
   return result;
