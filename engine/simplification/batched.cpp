@@ -30,9 +30,9 @@ class Batches {
         log_(log),
         context_(context),
         count_(nodes.count()),
-        cost_(std::make_unique_for_overwrite<float[]>(padded_to_block(count_))) {
+        cost_(make_large_array<float>(padded_to_block(count_))) {
     for (auto* column : {&key_, &partner_, &mate_, &map_, &source_, &second_, &step_}) {
-      *column = std::make_unique_for_overwrite<std::uint32_t[]>(padded_to_block(count_));
+      *column = make_large_array<std::uint32_t>(padded_to_block(count_));
     }
     std::uint32_t* const id = id_.next(count_);
     float* const made_at = made_at_.next(count_);
@@ -47,8 +47,8 @@ class Batches {
     const auto surplus =
         static_cast<std::size_t>(is_bounded ? 0.0 : kSurplus * static_cast<double>(goal_.count));
     const std::size_t least = std::max<std::size_t>(goal_.count - surplus, 1);
-    log_.steps = std::make_unique_for_overwrite<ContractionLog::Step[]>(count_ - least);
-    log_.neighbors = std::make_unique_for_overwrite<std::uint32_t[]>((count_ - least) * kRowNeighbors);
+    log_.steps = make_large_array<ContractionLog::Step>(count_ - least);
+    log_.neighbors = make_large_array<std::uint32_t>((count_ - least) * kRowNeighbors);
     start_rows(position, graph);
     bool is_new_graph = false;
     while (count_ > least) {
@@ -291,14 +291,14 @@ class Batches {
   ShrinkingColumn<std::uint32_t> id_;    // indices into the input, ascending
   ShrinkingColumn<float> made_at_;       // the cost of the contraction that made each, in the log's sense
   ShrinkingColumn<ContractionRow> rows_;
-  std::unique_ptr<float[]> cost_;             // of each one's cheapest pair
-  std::unique_ptr<std::uint32_t[]> key_;      // PartnerKernelArgs::key
-  std::unique_ptr<std::uint32_t[]> partner_;  // the other node of that pair
-  std::unique_ptr<std::uint32_t[]> mate_;     // what each is contracted with in this round, or kNoNode
-  std::unique_ptr<std::uint32_t[]> map_;      // old number to new one
-  std::unique_ptr<std::uint32_t[]> source_;   // new number to the old one, of contracted pairs the first,
-  std::unique_ptr<std::uint32_t[]> second_;   // the second, or kNoNode,
-  std::unique_ptr<std::uint32_t[]> step_;     // and the number in the log
+  LargeArray<float> cost_;             // of each one's cheapest pair
+  LargeArray<std::uint32_t> key_;      // PartnerKernelArgs::key
+  LargeArray<std::uint32_t> partner_;  // the other node of that pair
+  LargeArray<std::uint32_t> mate_;     // what each is contracted with in this round, or kNoNode
+  LargeArray<std::uint32_t> map_;      // old number to new one
+  LargeArray<std::uint32_t> source_;   // new number to the old one, of contracted pairs the first,
+  LargeArray<std::uint32_t> second_;   // the second, or kNoNode,
+  LargeArray<std::uint32_t> step_;     // and the number in the log
 };
 
 }  // namespace

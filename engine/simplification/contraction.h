@@ -11,6 +11,7 @@
 #include "engine/core/execution_context.h"
 #include "engine/core/points.h"
 #include "engine/simplification/contraction_kernels.h"
+#include "engine/simplification/large_array.h"
 #include "engine/simplification/simplification.h"
 #include "engine/spatial/neighbor_graph.h"
 
@@ -46,9 +47,9 @@ struct ContractionLog {
     std::uint32_t neighbor_count;
     std::uint64_t first_neighbor;
   };
-  std::unique_ptr<Step[]> steps;  ///< not touched, so not resident, beyond the count
+  LargeArray<Step> steps;  ///< not touched, so not resident, beyond the count
   std::size_t count = 0;
-  std::unique_ptr<std::uint32_t[]> neighbors;  ///< of the survivors
+  LargeArray<std::uint32_t> neighbors;  ///< of the survivors
 };
 
 /// A column that is rewritten as a whole, again and again, each time for fewer nodes. Padded to whole blocks.
@@ -62,7 +63,7 @@ class ShrinkingColumn {
     const std::size_t padded = padded_to_block(count);
     if (next_size_ < padded || next_size_ > 2 * padded) {
       next_.reset();
-      next_ = std::make_unique_for_overwrite<T[]>(padded);
+      next_ = make_large_array<T>(padded);
       next_size_ = padded;
     }
     return next_.get();
@@ -74,7 +75,7 @@ class ShrinkingColumn {
   }
 
  private:
-  std::unique_ptr<T[]> current_, next_;
+  LargeArray<T> current_, next_;
   std::size_t current_size_ = 0;
   std::size_t next_size_ = 0;
 };

@@ -29,7 +29,7 @@ class Greedy {
   }
 
   bool run(const Points& position, const NeighborGraph& graph) {
-    log_.steps = std::make_unique_for_overwrite<ContractionLog::Step[]>(position.size() - goal_.count);
+    log_.steps = make_large_array<ContractionLog::Step>(position.size() - goal_.count);
     connect(position, graph);
     for (std::size_t left = position.size(); left > goal_.count; --left) {
       if (log_.count % kCancelInterval == 0 && is_cancelled()) return false;
@@ -44,7 +44,7 @@ class Greedy {
       heap_.pop();
       contract(best);
     }
-    log_.neighbors = std::make_unique_for_overwrite<std::uint32_t[]>(neighbors_.size());
+    log_.neighbors = make_large_array<std::uint32_t>(neighbors_.size());
     std::copy(neighbors_.begin(), neighbors_.end(), log_.neighbors.get());
     return !is_cancelled();
   }

@@ -3,6 +3,7 @@
 #include "engine/simplification/simplification.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <functional>
@@ -85,14 +86,22 @@ void settle(const Points& position, const Points& normal, Simplification& result
     Vec3d normal = Vec3d::Zero();
     double count = 0.0;
   };
-  std::vector<Sum> sums(result.kept.size());
-  for (std::size_t i = 0; i < position.size(); ++i) {
-    Sum& sum = sums[result.parent[i]];
-    sum.position += position[i].cast<double>();
-    const double side = normal[i].dot(result.normal[result.parent[i]]) < 0.0F ? -1.0 : 1.0;
-    sum.normal += side * normal[i].cast<double>();
-    sum.count += 1.0;
-  }
+  // Every range of survivors goes over the samples from its first on: survivors are the first of their own.
+  constexpr std::size_t kRanges = 4;
+  const std::size_t kept = result.kept.size();
+  std::vector<Sum> sums(kept);
+  const auto sum_up = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = result.kept[begin]; i < position.size(); ++i) {
+      const std::uint32_t m = result.parent[i];
+      if (m < begin || m >= end) continue;
+      Sum& sum = sums[m];
+      sum.position += position[i].cast<double>();
+      const double side = normal[i].dot(result.normal[m]) < 0.0F ? -1.0 : 1.0;
+      sum.normal += side * normal[i].cast<double>();
+      sum.count += 1.0;
+    }
+  };
+  parallel_for(kept, sum_up, (kept + kRanges - 1) / kRanges);
   parallel_for(sums.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t m = begin; m < end; ++m) {
       const Sum& sum = sums[m];
@@ -106,34 +115,50 @@ void settle(const Points& position, const Points& normal, Simplification& result
   });
 }
 
+// The greatest of all offers, whatever their order.
+void raise(std::uint32_t& value, std::uint32_t offer) {
+  const std::atomic_ref<std::uint32_t> ref(value);
+  std::uint32_t current = ref.load(std::memory_order_relaxed);
+  while (current < offer && !ref.compare_exchange_weak(current, offer, std::memory_order_relaxed)) {
+  }
+}
+
 // Every column of the result but the record, which has all the contractions to be done.
 void apply_record(const Points& position, const Points& normal, Simplification& result) {
   const std::size_t n = position.size();
   const ContractionRecord& record = result.record;
-  constexpr std::uint32_t kNone = 0xffffffffU;
-  std::vector<std::uint32_t> last_step(n, kNone);
-  std::vector<std::uint32_t> survivor(n);
-  std::iota(survivor.begin(), survivor.end(), 0U);
-  for (std::size_t s = 0; s < record.steps.size(); ++s) {
-    last_step[record.steps[s].survivor] = static_cast<std::uint32_t>(s);
-    survivor[record.steps[s].removed] = record.steps[s].survivor;
-  }
+  const auto last_step = make_large_array<std::uint32_t>(n);  // + 1; 0 for none
+  const auto survivor = make_large_array<std::uint32_t>(n);
+  parallel_for(n, [&](std::size_t begin, std::size_t end) {
+    std::fill(last_step.get() + begin, last_step.get() + end, 0U);
+    std::iota(survivor.get() + begin, survivor.get() + end, static_cast<std::uint32_t>(begin));
+  });
+  parallel_for(record.steps.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      const Contraction& step = record.steps[s];
+      survivor[step.removed] = step.survivor;
+      raise(last_step[step.survivor], static_cast<std::uint32_t>(s + 1));
+    }
+  });
+  result.parent.resize(n);
   for (std::uint32_t i = 0; i < n; ++i) {
-    if (survivor[i] == i) result.kept.push_back(i);
+    if (survivor[i] == i) {
+      result.parent[i] = static_cast<std::uint32_t>(result.kept.size());
+      result.kept.push_back(i);
+    } else {
+      result.parent[i] = result.parent[survivor[i]];  // which comes before i
+    }
   }
   result.position.resize(result.kept.size());
   result.normal.resize(result.kept.size());
-  result.parent.resize(n);
-  for (std::uint32_t m = 0; m < result.kept.size(); ++m) {
-    const std::uint32_t i = result.kept[m];
-    const std::uint32_t s = last_step[i];
-    result.position.set(m, s == kNone ? position[i] : record.position[s]);
-    result.normal.set(m, s == kNone ? normal[i] : record.normal[s]);
-    result.parent[i] = m;
-  }
-  for (std::size_t s = record.steps.size(); s-- > 0;) {
-    result.parent[record.steps[s].removed] = result.parent[record.steps[s].survivor];
-  }
+  parallel_for(result.kept.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t m = begin; m < end; ++m) {
+      const std::uint32_t i = result.kept[m];
+      const std::uint32_t steps = last_step[i];
+      result.position.set(m, steps == 0 ? position[i] : record.position[steps - 1]);
+      result.normal.set(m, steps == 0 ? normal[i] : record.normal[steps - 1]);
+    }
+  });
   if (result.placement == Placement::kOnSurface && !record.steps.empty()) settle(position, normal, result);
 }
 
