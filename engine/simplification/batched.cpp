@@ -243,8 +243,8 @@ class Batches {
     return merged;
   }
 
-  static void write_step(ContractionLog::Step& step, std::uint32_t survivor, std::uint32_t removed, float cost,
-                         const ContractionNode& node) {
+  static void write_step(ContractionLog::Step& step, std::uint32_t survivor, std::uint32_t removed,
+                         float cost, const ContractionNode& node) {
     const float* f = node.fields;
     step.contraction = {survivor, removed, std::sqrt(f[12])};
     step.cost = cost;
@@ -287,9 +287,9 @@ class Batches {
   ContractionNodes& nodes_;
   ContractionLog& log_;
   const ExecutionContext* context_;
-  std::size_t count_;                    // samples that are left
-  ShrinkingColumn<std::uint32_t> id_;    // indices into the input, ascending
-  ShrinkingColumn<float> made_at_;       // the cost of the contraction that made each, in the log's sense
+  std::size_t count_;                  // samples that are left
+  ShrinkingColumn<std::uint32_t> id_;  // indices into the input, ascending
+  ShrinkingColumn<float> made_at_;     // the cost of the contraction that made each, in the log's sense
   ShrinkingColumn<ContractionRow> rows_;
   LargeArray<float> cost_;             // of each one's cheapest pair
   LargeArray<std::uint32_t> key_;      // PartnerKernelArgs::key

@@ -32,14 +32,13 @@ inline constexpr std::uint32_t kStartNeighbors = 12;
 /// When to stop, and what a pair may cost; lengths in the nodes' scale.
 struct ContractionGoal {
   std::size_t count = 1;  ///< samples to be left
-  PairCost rule{.length_weight = 0.0F,
-                .limit = std::numeric_limits<float>::infinity(),
-                .separate_sheets = true};
+  PairCost rule{
+      .length_weight = 0.0F, .limit = std::numeric_limits<float>::infinity(), .separate_sheets = true};
 };
 
 /// The contractions as they were made. Both orders fill it; simplify() brings it in order of cost.
 struct ContractionLog {
-  struct alignas(64) Step {  // a cache line: the order of cost is as good as random
+  struct alignas(64) Step {   // a cache line: the order of cost is as good as random
     Contraction contraction;  ///< its error in the nodes' scale
     float cost;               ///< never less than those of the steps that it builds on
     float position[3];        ///< of the survivor
@@ -98,8 +97,8 @@ class ContractionNodes {
 
   /// Costs of the pairs (first[i], second[i]). The columns have room for whole blocks, the pairs' with valid
   /// indices.
-  void costs(const PairCost& rule, const std::uint32_t* first, const std::uint32_t* second,
-             std::size_t count, float* cost) const;
+  void costs(const PairCost& rule, const std::uint32_t* first, const std::uint32_t* second, std::size_t count,
+             float* cost) const;
   /// The contracted nodes, which are not stored yet; columns as above.
   void contract(const std::uint32_t* first, const std::uint32_t* second, std::size_t count,
                 ContractionNode* merged) const;

@@ -68,7 +68,7 @@ struct RowKernelArgs {
   const std::uint32_t* map;
   const std::uint32_t* source;
   const std::uint32_t* partner;
-  const float* nodes;      ///< under the new numbers
+  const float* nodes;  ///< under the new numbers
   std::uint32_t* new_rows;
   std::uint8_t* length;  ///< of contracted nodes, from `begin` on: entries of the new row
 };

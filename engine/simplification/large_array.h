@@ -54,7 +54,8 @@ LargeArray<T> make_large_array(std::size_t count) {
   }
 #endif
   constexpr std::align_val_t kAlignment{kLine};
-  return {static_cast<T*>(::operator new(count * sizeof(T), kAlignment)), FreeMemory{.alignment = kAlignment}};
+  return {static_cast<T*>(::operator new(count * sizeof(T), kAlignment)),
+          FreeMemory{.alignment = kAlignment}};
 }
 
 }  // namespace pointwright

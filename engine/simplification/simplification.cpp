@@ -24,10 +24,9 @@ constexpr float kMaxLengthWeight = 10.0F;
 
 // Sizes the columns, several at a time: zeroing them is what their first use costs most in.
 void resize_record(ContractionRecord& record, std::size_t steps) {
-  const std::function<void()> columns[] = {[&] { record.steps.resize(steps); },
-                                           [&] { record.position.resize(steps); },
-                                           [&] { record.normal.resize(steps); },
-                                           [&] { record.neighbor_first.resize(steps + 1); }};
+  const std::function<void()> columns[] = {
+      [&] { record.steps.resize(steps); }, [&] { record.position.resize(steps); },
+      [&] { record.normal.resize(steps); }, [&] { record.neighbor_first.resize(steps + 1); }};
   parallel_for(
       std::size(columns), [&](std::size_t c, std::size_t) { columns[c](); }, 1);
 }
@@ -69,7 +68,8 @@ ContractionRecord ordered_record(const ContractionLog& log, std::size_t count, f
     for (std::size_t s = begin; s < end; ++s) {
       if (s + kAhead < end) __builtin_prefetch(&log.neighbors[keys[s + kAhead]]);
       const std::size_t first = record.neighbor_first[s];
-      std::copy_n(&log.neighbors[keys[s]], record.neighbor_first[s + 1] - first, record.neighbor.data() + first);
+      std::copy_n(&log.neighbors[keys[s]], record.neighbor_first[s + 1] - first,
+                  record.neighbor.data() + first);
     }
   });
   return record;
