@@ -20,26 +20,20 @@ constexpr std::size_t kBlock = 1024;  // nodes of a parallel block
 // count. What is dear in an early round can be cheap beside what comes later.
 constexpr double kSurplus = 0.5;
 
-// The samples that are left are numbered anew in each round, so that what a round reads is dense in memory.
+// A contracted pair goes on as its first node; the second one's place is empty until half of all are.
 class Batches {
  public:
   Batches(const ContractionGoal& goal, ContractionNodes& nodes, ContractionLog& log,
           const ExecutionContext* context)
-      : goal_(goal),
-        nodes_(nodes),
-        log_(log),
-        context_(context),
-        count_(nodes.count()),
-        cost_(make_large_array<float>(padded_to_block(count_))) {
-    for (auto* column : {&key_, &partner_, &mate_, &map_, &source_, &second_, &step_}) {
-      *column = make_large_array<std::uint32_t>(padded_to_block(count_));
-    }
-    std::uint32_t* const id = id_.next(count_);
-    float* const made_at = made_at_.next(count_);
-    std::iota(id, id + count_, 0U);
-    std::fill_n(made_at, count_, 0.0F);
-    id_.swap();
-    made_at_.swap();
+      : goal_(goal), nodes_(nodes), log_(log), context_(context) {
+    set_room(nodes.count());
+    id_ = make_large_array<std::uint32_t>(count_);
+    made_at_ = make_large_array<float>(count_);
+    cost_ = make_large_array<float>(count_);
+    rows_ = make_large_array<ContractionRow>(count_);
+    for (auto* column : {&key_, &partner_, &mate_, &step_}) *column = make_large_array<std::uint32_t>(count_);
+    std::iota(id_.get(), id_.get() + count_, 0U);
+    std::fill_n(made_at_.get(), count_, 0.0F);
   }
 
   bool run(const Points& position, const NeighborGraph& graph) {
@@ -57,9 +51,11 @@ class Batches {
         is_new_graph = false;
         contract();
         update_rows();
+        if (2 * count_ <= room_) compact();
       } else {
         if (is_new_graph || count_ <= goal_.count) break;
         is_new_graph = true;
+        compact();
         const SurvivorGraph left = survivor_graph(nodes_, context_);
         if (is_cancelled()) return false;
         start_rows(left.position, left.graph);
@@ -71,35 +67,46 @@ class Batches {
  private:
   [[nodiscard]] bool is_cancelled() const { return context_ != nullptr && context_->is_cancelled(); }
 
-  // Rows from a graph over the samples that are left.
+  // `count` nodes, all of them live.
+  void set_room(std::size_t count) {
+    room_ = count_ = count;
+    live_ = make_large_array<std::uint32_t>(padded_to_block(count));
+    next_live_ = make_large_array<std::uint32_t>(padded_to_block(count));
+    forward_ = make_large_array<std::uint32_t>(count);
+    std::iota(live_.get(), live_.get() + count, 0U);
+    std::iota(forward_.get(), forward_.get() + count, 0U);
+    pad_live();
+  }
+  void pad_live() { std::fill(live_.get() + count_, live_.get() + padded_to_block(count_), live_[0]); }
+
+  // Rows from a graph over the samples that are left, which are all there is room for.
   void start_rows(const Points& position, const NeighborGraph& graph) {
-    ContractionRow* const rows = rows_.next(count_);
     parallel_for(
         count_,
         [&](std::size_t begin, std::size_t end) {
           for (std::size_t i = begin; i < end; ++i) {
-            const std::uint32_t length = starting_row(position, graph, i, rows[i].neighbor);
-            std::fill(rows[i].neighbor + length, rows[i].neighbor + kRowNeighbors,
-                      static_cast<std::uint32_t>(i));
+            std::uint32_t* const row = rows_[i].neighbor;
+            const std::uint32_t length =
+                starting_row(position, graph, i, std::span<std::uint32_t, kRowNeighbors>(row, kRowNeighbors));
+            std::fill(row + length, row + kRowNeighbors, static_cast<std::uint32_t>(i));
           }
-          rate(rows, begin, end);
         },
         kBlock, context_);
-    rows_.swap();
+    parallel_for(
+        count_, [&](std::size_t begin, std::size_t end) { rate(begin, end); }, kBlock, context_);
   }
 
-  // Finds the cheapest pairs of the nodes [begin, end) over their own rows.
-  void rate(ContractionRow* rows, std::size_t begin, std::size_t end) {
-    const std::size_t padded = padded_to_block(end);
-    std::fill(rows + end, rows + padded, ContractionRow{});
+  // Finds the cheapest pairs of the nodes live_[begin] .. live_[end - 1] over their own rows.
+  void rate(std::size_t begin, std::size_t end) {
     POINTWRIGHT_KERNEL(best_partners_kernel)
     ({.nodes = nodes_.data(),
-      .rows = rows->neighbor,
+      .rows = rows_[0].neighbor,
+      .live = live_.get(),
       .rule = goal_.rule,
       .cost = cost_.get(),
       .key = key_.get(),
       .partner = partner_.get()},
-     begin, padded);
+     begin, padded_to_block(end));
   }
 
   // Marks the pairs that are the cheapest of both their samples in mate_, the cheapest `most` of them. Returns
@@ -108,7 +115,8 @@ class Batches {
     accept_offers();
     const auto mark = [&](std::size_t begin, std::size_t end) {
       std::size_t found = 0;
-      for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t l = begin; l < end; ++l) {
+        const std::uint32_t i = live_[l];
         const std::uint32_t j = partner_[i];
         const bool is_mutual = j != kNoNode && partner_[j] == i;
         mate_[i] = is_mutual ? j : kNoNode;
@@ -136,10 +144,11 @@ class Batches {
     parallel_for(
         count_,
         [&](std::size_t begin, std::size_t end) {
-          for (std::size_t i = begin; i < end; ++i) {
+          for (std::size_t l = begin; l < end; ++l) {
+            const std::uint32_t i = live_[l];
             const std::uint32_t j = partner_[i];
             if (j == kNoNode || partner_[j] == i) continue;
-            const Offer offer{cost_[i], key_[i], static_cast<std::uint32_t>(i), j};
+            const Offer offer{cost_[i], key_[i], i, j};
             if (is_better(offer)) offers[begin / kBlock].push_back(offer);
           }
         },
@@ -157,7 +166,8 @@ class Batches {
   void keep_cheapest(std::size_t pairs, std::size_t most) {
     std::vector<std::uint64_t> order;  // by cost, whose bits order it, then by the first node
     order.reserve(pairs);
-    for (std::uint32_t i = 0; i < count_; ++i) {
+    for (std::size_t l = 0; l < count_; ++l) {
+      const std::uint32_t i = live_[l];
       if (mate_[i] != kNoNode && i < mate_[i])
         order.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(cost_[i])} << 32U | i);
     }
@@ -170,7 +180,7 @@ class Batches {
     });
   }
 
-  // Contracts the pairs and numbers the nodes anew: a contracted one has its first node's place in the order.
+  // Contracts the pairs and takes their second nodes from the list of those that are left.
   void contract() {
     struct Offset {
       std::size_t node = 0, pair = 0;
@@ -181,66 +191,55 @@ class Batches {
         count_,
         [&](std::size_t begin, std::size_t end) {
           Offset& here = offset[begin / kBlock + 1];
-          for (std::size_t i = begin; i < end; ++i) {
-            here.node += mate_[i] == kNoNode || i < mate_[i] ? 1 : 0;
-            here.pair += mate_[i] != kNoNode && i < mate_[i] ? 1 : 0;
+          for (std::size_t l = begin; l < end; ++l) {
+            const std::uint32_t i = live_[l];
+            here.node += mate_[i] > i ? 1 : 0;  // kNoNode is
+            here.pair += mate_[i] > i && mate_[i] != kNoNode ? 1 : 0;
           }
         },
         kBlock);
     std::partial_sum(offset.begin(), offset.end(), offset.begin());
-    const std::size_t left = offset.back().node;
-    ContractionNode* const nodes = nodes_.next(left);
-    std::uint32_t* const id = id_.next(left);
-    float* const made_at = made_at_.next(left);
     parallel_for(
         count_,
         [&](std::size_t begin, std::size_t end) {
-          const auto merged = contracted(begin, end);
           auto [next, pair] = offset[begin / kBlock];
-          const std::size_t first_pair = pair;
-          for (std::size_t i = begin; i < end; ++i) {
-            const std::uint32_t other = mate_[i];
-            if (other < i) continue;
-            const auto node = static_cast<std::uint32_t>(next);
-            map_[i] = node;
-            source_[next] = static_cast<std::uint32_t>(i);
-            second_[next] = other;
-            id[next] = id_.data()[i];
-            if (other == kNoNode) {
-              nodes[next] = nodes_[i];
-              made_at[next] = made_at_.data()[i];
-            } else {
-              map_[other] = node;
-              nodes[next] = merged[pair - first_pair];
-              made_at[next] = std::max({cost_[i], made_at_.data()[i], made_at_.data()[other]});
-              const std::size_t step = log_.count + pair++;
-              step_[next] = static_cast<std::uint32_t>(step);
-              write_step(log_.steps[step], id_.data()[i], id_.data()[other], made_at[next], nodes[next]);
-            }
-            ++next;
+          contract_block(begin, end, log_.count + pair);
+          for (std::size_t l = begin; l < end; ++l) {
+            const std::uint32_t i = live_[l];
+            if (mate_[i] > i) next_live_[next++] = i;
           }
         },
         kBlock);
     log_.count += offset.back().pair;
-    nodes_.replace(left);
-    id_.swap();
-    made_at_.swap();
-    count_ = left;
+    count_ = offset.back().node;
+    live_.swap(next_live_);
+    pad_live();
   }
 
-  // The results of the pairs whose first nodes are [begin, end), in this order.
-  [[nodiscard]] std::unique_ptr<ContractionNode[]> contracted(std::size_t begin, std::size_t end) const {
+  // The pairs whose first nodes are live_[begin] .. live_[end - 1], as the steps from `step` on.
+  void contract_block(std::size_t begin, std::size_t end, std::size_t step) {
     std::uint32_t first[kBlock] = {};
     std::uint32_t second[kBlock] = {};
     std::size_t pairs = 0;
-    for (std::size_t i = begin; i < end; ++i) {
-      if (mate_[i] == kNoNode || mate_[i] < i) continue;
-      first[pairs] = static_cast<std::uint32_t>(i);
-      second[pairs++] = mate_[i];
+    for (std::size_t l = begin; l < end; ++l) {
+      const std::uint32_t i = live_[l];
+      first[pairs] = i;
+      second[pairs] = mate_[i];
+      pairs += mate_[i] > i && mate_[i] != kNoNode ? 1 : 0;
     }
-    auto merged = std::make_unique_for_overwrite<ContractionNode[]>(padded_to_block(pairs));
+    std::fill(first + pairs, first + padded_to_block(pairs), first[0]);
+    std::fill(second + pairs, second + padded_to_block(pairs), first[0]);
+    const auto merged = std::make_unique_for_overwrite<ContractionNode[]>(padded_to_block(pairs));
     nodes_.contract(first, second, pairs, merged.get());
-    return merged;
+    for (std::size_t p = 0; p < pairs; ++p, ++step) {
+      const std::uint32_t a = first[p];
+      const std::uint32_t b = second[p];
+      nodes_.set(a, merged[p]);
+      forward_[b] = a;
+      made_at_[a] = std::max({cost_[a], made_at_[a], made_at_[b]});
+      step_[a] = static_cast<std::uint32_t>(step);
+      write_step(log_.steps[step], id_[a], id_[b], made_at_[a], merged[p]);
+    }
   }
 
   static void write_step(ContractionLog::Step& step, std::uint32_t survivor, std::uint32_t removed,
@@ -254,51 +253,72 @@ class Batches {
 
   // Rows follow the last round's contractions, and so do the cheapest pairs.
   void update_rows() {
-    ContractionRow* const rows = rows_.next(count_);
     const auto merge = POINTWRIGHT_KERNEL(merge_rows_kernel);
     parallel_for(
         count_,
         [&](std::size_t begin, std::size_t end) {
           std::uint8_t length[kBlock];
-          merge({.rows = rows_.data()->neighbor,
-                 .map = map_.get(),
-                 .source = source_.get(),
-                 .partner = second_.get(),
-                 .nodes = nodes_.data(),
-                 .new_rows = rows->neighbor,
+          merge({.nodes = nodes_.data(),
+                 .forward = forward_.get(),
+                 .live = live_.get(),
+                 .mate = mate_.get(),
+                 .rows = rows_[0].neighbor,
                  .length = length},
                 begin, end);
-          for (std::size_t i = begin; i < end; ++i) {
-            if (second_[i] == kNoNode) continue;
+          for (std::size_t l = begin; l < end; ++l) {
+            const std::uint32_t i = live_[l];
+            if (mate_[i] == kNoNode) continue;
             ContractionLog::Step& step = log_.steps[step_[i]];
-            step.neighbor_count = length[i - begin];
+            step.neighbor_count = length[l - begin];
             step.first_neighbor = std::uint64_t{step_[i]} * kRowNeighbors;
             for (std::uint32_t s = 0; s < step.neighbor_count; ++s) {
-              log_.neighbors[step.first_neighbor + s] = id_.data()[rows[i].neighbor[s]];
+              log_.neighbors[step.first_neighbor + s] = id_[rows_[i].neighbor[s]];
             }
           }
-          rate(rows, begin, end);
+          rate(begin, end);
         },
         kBlock, context_);
-    rows_.swap();
+  }
+
+  // Numbers the nodes that are left anew, so that what a round reads is dense in memory again.
+  void compact() {
+    parallel_for(count_, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t l = begin; l < end; ++l) forward_[live_[l]] = static_cast<std::uint32_t>(l);
+    });
+    nodes_.compact(live_.get(), count_);
+    pointwright::compact(id_, live_.get(), count_);
+    pointwright::compact(made_at_, live_.get(), count_);
+    pointwright::compact(cost_, live_.get(), count_);
+    pointwright::compact(key_, live_.get(), count_);
+    pointwright::compact(partner_, live_.get(), count_);
+    pointwright::compact(rows_, live_.get(), count_);
+    parallel_for(count_, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        for (std::uint32_t& neighbor : rows_[i].neighbor) neighbor = forward_[neighbor];
+        if (partner_[i] != kNoNode) partner_[i] = forward_[partner_[i]];
+      }
+    });
+    for (auto* column : {&mate_, &step_}) *column = make_large_array<std::uint32_t>(count_);
+    set_room(count_);
   }
 
   const ContractionGoal& goal_;
   ContractionNodes& nodes_;
   ContractionLog& log_;
   const ExecutionContext* context_;
-  std::size_t count_;                  // samples that are left
-  ShrinkingColumn<std::uint32_t> id_;  // indices into the input, ascending
-  ShrinkingColumn<float> made_at_;     // the cost of the contraction that made each, in the log's sense
-  ShrinkingColumn<ContractionRow> rows_;
+  std::size_t room_ = 0;                 // nodes, the contracted ones among them
+  std::size_t count_ = 0;                // and those that are left,
+  LargeArray<std::uint32_t> live_;       // which are these, ascending
+  LargeArray<std::uint32_t> next_live_;  // where the next round's are written
+  LargeArray<std::uint32_t> forward_;    // of every node, what it is part of
+  LargeArray<std::uint32_t> id_;         // indices into the input, ascending
+  LargeArray<float> made_at_;            // the cost of the contraction that made each, in the log's sense
+  LargeArray<ContractionRow> rows_;
   LargeArray<float> cost_;             // of each one's cheapest pair
   LargeArray<std::uint32_t> key_;      // PartnerKernelArgs::key
   LargeArray<std::uint32_t> partner_;  // the other node of that pair
   LargeArray<std::uint32_t> mate_;     // what each is contracted with in this round, or kNoNode
-  LargeArray<std::uint32_t> map_;      // old number to new one
-  LargeArray<std::uint32_t> source_;   // new number to the old one, of contracted pairs the first,
-  LargeArray<std::uint32_t> second_;   // the second, or kNoNode,
-  LargeArray<std::uint32_t> step_;     // and the number in the log
+  LargeArray<std::uint32_t> step_;     // of a contracted one, the number in the log
 };
 
 }  // namespace

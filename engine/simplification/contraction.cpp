@@ -22,8 +22,9 @@ float unit_scale(const Points& position) {
 
 ContractionNodes::ContractionNodes(const Points& position, const Points& normal, const NeighborGraph& graph,
                                    bool separate_sheets, const ExecutionContext* context)
-    : scale_(unit_scale(position)) {
-  ContractionNode* const nodes = next(position.size());
+    : nodes_(make_large_array<ContractionNode>(padded_to_block(position.size()))),
+      count_(position.size()),
+      scale_(unit_scale(position)) {
   const NodeKernelArgs args{.x = position.x(),
                             .y = position.y(),
                             .z = position.z(),
@@ -34,18 +35,15 @@ ContractionNodes::ContractionNodes(const Points& position, const Points& normal,
                             .k = graph.k,
                             .scale = scale_,
                             .separate_sheets = separate_sheets,
-                            .nodes = nodes->fields};
+                            .nodes = nodes_[0].fields};
   const auto build = POINTWRIGHT_KERNEL(build_nodes_kernel);
   parallel_for(
-      padded_to_block(position.size()), [&](std::size_t begin, std::size_t end) { build(args, begin, end); },
+      padded_to_block(count_), [&](std::size_t begin, std::size_t end) { build(args, begin, end); },
       kParallelBlock, context);
-  replace(position.size());
 }
 
-void ContractionNodes::replace(std::size_t count) {
-  ContractionNode* const nodes = next(count);
-  std::fill(nodes + count, nodes + padded_to_block(count), ContractionNode{});
-  nodes_.swap();
+void ContractionNodes::compact(const std::uint32_t* source, std::size_t count) {
+  pointwright::compact(nodes_, source, count);
   count_ = count;
 }
 

@@ -51,34 +51,6 @@ struct ContractionLog {
   LargeArray<std::uint32_t> neighbors;  ///< of the survivors
 };
 
-/// A column that is rewritten as a whole, again and again, each time for fewer nodes. Padded to whole blocks.
-template <typename T>
-class ShrinkingColumn {
- public:
-  [[nodiscard]] T* data() { return current_.get(); }
-  [[nodiscard]] const T* data() const { return current_.get(); }
-  /// Room for the next version, without values. It is given back where half of it would do.
-  [[nodiscard]] T* next(std::size_t count) {
-    const std::size_t padded = padded_to_block(count);
-    if (next_size_ < padded || next_size_ > 2 * padded) {
-      next_.reset();
-      next_ = make_large_array<T>(padded);
-      next_size_ = padded;
-    }
-    return next_.get();
-  }
-  /// The next version becomes the current one.
-  void swap() {
-    current_.swap(next_);
-    std::swap(current_size_, next_size_);
-  }
-
- private:
-  LargeArray<T> current_, next_;
-  std::size_t current_size_ = 0;
-  std::size_t next_size_ = 0;
-};
-
 /// The nodes of the samples, and kernel calls over them. The scale is a power of two that brings the cloud's
 /// extent near 1, so that squares of squares neither vanish nor overflow.
 class ContractionNodes {
@@ -88,12 +60,11 @@ class ContractionNodes {
 
   [[nodiscard]] float scale() const { return scale_; }
   [[nodiscard]] std::size_t count() const { return count_; }
-  [[nodiscard]] const ContractionNode& operator[](std::size_t i) const { return nodes_.data()[i]; }
-  [[nodiscard]] const float* data() const { return nodes_.data()->fields; }
-  void set(std::size_t i, const ContractionNode& node) { nodes_.data()[i] = node; }
-  /// Where to write the nodes that replace these, padding apart, and to have them replaced.
-  [[nodiscard]] ContractionNode* next(std::size_t count) { return nodes_.next(count); }
-  void replace(std::size_t count);
+  [[nodiscard]] const ContractionNode& operator[](std::size_t i) const { return nodes_[i]; }
+  [[nodiscard]] const float* data() const { return nodes_[0].fields; }
+  void set(std::size_t i, const ContractionNode& node) { nodes_[i] = node; }
+  /// Leaves the nodes source[0], source[1], ..., which get the numbers 0, 1, ...
+  void compact(const std::uint32_t* source, std::size_t count);
 
   /// Costs of the pairs (first[i], second[i]). The columns have room for whole blocks, the pairs' with valid
   /// indices.
@@ -104,7 +75,7 @@ class ContractionNodes {
                 ContractionNode* merged) const;
 
  private:
-  ShrinkingColumn<ContractionNode> nodes_;
+  LargeArray<ContractionNode> nodes_;
   std::size_t count_ = 0;
   float scale_ = 1.0F;
 };

@@ -51,25 +51,25 @@ struct PairKernelArgs {
   float* merged;  ///< where not null: the contracted nodes, kNodeFloats each
 };
 
-/// Nodes and rows are padded to whole blocks; so are the outputs.
+/// The list `live` is padded to whole blocks with any of its nodes; all else is addressed by node.
 struct PartnerKernelArgs {
   const float* nodes;
   const std::uint32_t* rows;  ///< kRowNeighbors a node
+  const std::uint32_t* live;
   PairCost rule;
   float* cost;             ///< of each node's cheapest pair over its own row; infinity without one
   std::uint32_t* key;      ///< of that pair: orders pairs of equal cost as if at random
   std::uint32_t* partner;  ///< or kNoNode; where cost and key are equal, too, the lower one
 };
 
-/// Node i of the new numbering was source[i] of the old one, contracted with partner[i] where that is not
-/// kNoNode; map[] takes old numbers to new ones.
+/// `mate` is what a node of the list has been contracted with, or kNoNode; `forward` takes every node to what
+/// it is part of now.
 struct RowKernelArgs {
-  const std::uint32_t* rows;
-  const std::uint32_t* map;
-  const std::uint32_t* source;
-  const std::uint32_t* partner;
-  const float* nodes;  ///< under the new numbers
-  std::uint32_t* new_rows;
+  const float* nodes;
+  const std::uint32_t* forward;
+  const std::uint32_t* live;
+  const std::uint32_t* mate;
+  std::uint32_t* rows;
   std::uint8_t* length;  ///< of contracted nodes, from `begin` on: entries of the new row
 };
 
@@ -81,10 +81,10 @@ POINTWRIGHT_DECLARE_KERNEL(void build_nodes_kernel(const NodeKernelArgs& args, s
 /// Costs or results of contracting the pairs [begin, end), begin at a whole block.
 POINTWRIGHT_DECLARE_KERNEL(void contract_pairs_kernel(const PairKernelArgs& args, std::size_t begin,
                                                       std::size_t end))
-/// The cheapest pairs of the nodes [begin, end), begin at a whole block.
+/// The cheapest pairs of the nodes live[begin] .. live[end - 1], begin at a whole block.
 POINTWRIGHT_DECLARE_KERNEL(void best_partners_kernel(const PartnerKernelArgs& args, std::size_t begin,
                                                      std::size_t end))
-/// Rows of the nodes [begin, end) under their new names. A contracted node gets what both had, without
-/// repetitions, the nearest where that is too many; others may list a node twice.
+/// Brings the rows of the nodes live[begin] .. live[end - 1] up to date. A contracted node gets what both had,
+/// without repetitions, the nearest where that is too many; others may list a node twice.
 POINTWRIGHT_DECLARE_KERNEL(void merge_rows_kernel(const RowKernelArgs& args, std::size_t begin,
                                                   std::size_t end))

@@ -68,9 +68,7 @@ class Greedy {
     for (std::uint32_t i = 0; i < id_.size(); ++i) {
       if (is_live_[i]) live.push_back(i);
     }
-    ContractionNode* const nodes = nodes_.next(live.size());
-    for (std::size_t l = 0; l < live.size(); ++l) nodes[l] = nodes_[live[l]];
-    nodes_.replace(live.size());
+    nodes_.compact(live.data(), live.size());
     for (std::size_t l = 0; l < live.size(); ++l) {
       id_[l] = id_[live[l]];
       node_cost_[l] = node_cost_[live[l]];

@@ -2,13 +2,17 @@
 // Scratch memory of a contraction (internal to this folder).
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <new>
 #include <type_traits>
+#include <utility>
 
 #if defined(__linux__)
 #include <sys/mman.h>
 #endif
+
+#include "engine/core/parallel.h"
 
 namespace pointwright {
 
@@ -56,6 +60,16 @@ LargeArray<T> make_large_array(std::size_t count) {
   constexpr std::align_val_t kAlignment{kLine};
   return {static_cast<T*>(::operator new(count * sizeof(T), kAlignment)),
           FreeMemory{.alignment = kAlignment}};
+}
+
+/// Leaves the values source[0], source[1], ..., in this order, and gives back the room of the others.
+template <typename T>
+void compact(LargeArray<T>& values, const std::uint32_t* source, std::size_t count) {
+  LargeArray<T> left = make_large_array<T>(count);
+  parallel_for(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) left[i] = values[source[i]];
+  });
+  values = std::move(left);
 }
 
 }  // namespace pointwright
