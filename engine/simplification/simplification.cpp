@@ -22,15 +22,6 @@ namespace {
 constexpr std::size_t kMaxSamples = (std::size_t{1} << 27U) - 1;  // node offsets are 31 bits
 constexpr float kMaxLengthWeight = 10.0F;
 
-// Sizes the columns, several at a time: zeroing them is what their first use costs most in.
-void resize_record(ContractionRecord& record, std::size_t steps) {
-  const std::function<void()> columns[] = {
-      [&] { record.steps.resize(steps); }, [&] { record.position.resize(steps); },
-      [&] { record.normal.resize(steps); }, [&] { record.neighbor_first.resize(steps + 1); }};
-  parallel_for(
-      std::size(columns), [&](std::size_t c, std::size_t) { columns[c](); }, 1);
-}
-
 // The log in order of cost, its first `count` contractions; lengths back in model units.
 ContractionRecord ordered_record(const ContractionLog& log, std::size_t count, float scale) {
   std::vector<std::uint64_t> keys(log.count);
@@ -45,31 +36,35 @@ ContractionRecord ordered_record(const ContractionLog& log, std::size_t count, f
   });
   sort_by_key(keys, order);
   ContractionRecord record;
-  resize_record(record, count);
-  const float inverse = 1.0F / scale;
+  record.neighbor_first.resize(count + 1);
   // The log's lines are anywhere in memory: asked for long before they are read.
   constexpr std::size_t kAhead = 16;
   parallel_for(count, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       if (s + kAhead < end) __builtin_prefetch(&log.steps[order[s + kAhead]]);
+      record.neighbor_first[s + 1] = log.steps[order[s]].neighbor_count;
+    }
+  });
+  std::partial_sum(record.neighbor_first.begin(), record.neighbor_first.end(), record.neighbor_first.begin());
+  // Zeroing the columns is what costs most in their first use: several at a time.
+  const std::function<void()> columns[] = {
+      [&] { record.neighbor.resize(record.neighbor_first[count]); }, [&] { record.steps.resize(count); },
+      [&] { record.position.resize(count); }, [&] { record.normal.resize(count); }};
+  parallel_for(
+      std::size(columns), [&](std::size_t c, std::size_t) { columns[c](); }, 1);
+  const float inverse = 1.0F / scale;
+  parallel_for(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      if (s + 2 * kAhead < end) __builtin_prefetch(&log.steps[order[s + 2 * kAhead]]);
+      if (s + kAhead < end) __builtin_prefetch(&log.neighbors[log.steps[order[s + kAhead]].first_neighbor]);
       const ContractionLog::Step& step = log.steps[order[s]];
       const float* p = step.position;
       record.steps[s] = step.contraction;
       record.steps[s].error *= inverse;
       record.position.set(s, {p[0] * inverse, p[1] * inverse, p[2] * inverse});
       record.normal.set(s, {step.normal[0], step.normal[1], step.normal[2]});
-      record.neighbor_first[s + 1] = step.neighbor_count;
-      keys[s] = step.first_neighbor;
-    }
-  });
-  std::partial_sum(record.neighbor_first.begin(), record.neighbor_first.end(), record.neighbor_first.begin());
-  record.neighbor.resize(record.neighbor_first[count]);
-  parallel_for(count, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) {
-      if (s + kAhead < end) __builtin_prefetch(&log.neighbors[keys[s + kAhead]]);
-      const std::size_t first = record.neighbor_first[s];
-      std::copy_n(&log.neighbors[keys[s]], record.neighbor_first[s + 1] - first,
-                  record.neighbor.data() + first);
+      std::copy_n(&log.neighbors[step.first_neighbor], step.neighbor_count,
+                  record.neighbor.data() + record.neighbor_first[s]);
     }
   });
   return record;
