@@ -46,7 +46,7 @@ LargeArray<T> make_large_array(std::size_t count) {
   static_assert(alignof(T) <= kLine);
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
   constexpr std::size_t kPage = std::size_t{2} << 20U;
-  if (count * sizeof(T) >= 2 * kPage) {
+  if (count * sizeof(T) >= kPage) {
     std::size_t bytes = (count * sizeof(T) + kPage - 1) / kPage * kPage;
     std::size_t room = bytes + kPage;  // what lies before and after whole pages is never touched
     void* const mapping = mmap(nullptr, room, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
