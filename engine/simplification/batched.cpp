@@ -93,20 +93,21 @@ class Batches {
         },
         kBlock, context_);
     parallel_for(
-        count_, [&](std::size_t begin, std::size_t end) { rate(begin, end); }, kBlock, context_);
+        count_, [&](std::size_t begin, std::size_t end) { rate(live_.get() + begin, end - begin); }, kBlock,
+        context_);
   }
 
-  // Finds the cheapest pairs of the nodes live_[begin] .. live_[end - 1] over their own rows.
-  void rate(std::size_t begin, std::size_t end) {
+  // Finds the cheapest pairs of the nodes in the list over their own rows. The list is padded.
+  void rate(const std::uint32_t* list, std::size_t count) {
     POINTWRIGHT_KERNEL(best_partners_kernel)
     ({.nodes = nodes_.data(),
       .rows = rows_[0].neighbor,
-      .live = live_.get(),
+      .live = list,
       .rule = goal_.rule,
       .cost = cost_.get(),
       .key = key_.get(),
       .partner = partner_.get()},
-     begin, padded_to_block(end));
+     0, padded_to_block(count));
   }
 
   // Marks the pairs that are the cheapest of both their samples in mate_, the cheapest `most` of them. Returns
@@ -275,9 +276,24 @@ class Batches {
               log_.neighbors[step.first_neighbor + s] = id_[rows_[i].neighbor[s]];
             }
           }
-          rate(begin, end);
+          rate_changed(begin, end);
         },
         kBlock, context_);
+  }
+
+  // Pairs grow no cheaper: that of a node stays its cheapest where neither of the two has changed. (With a
+  // length term a changed one may have come nearer; it knows that itself and offers.)
+  void rate_changed(std::size_t begin, std::size_t end) {
+    std::uint32_t changed[kBlock];
+    std::size_t count = 0;
+    for (std::size_t l = begin; l < end; ++l) {
+      const std::uint32_t i = live_[l];
+      const std::uint32_t j = partner_[i];
+      changed[count] = i;
+      count += mate_[i] != kNoNode || j == kNoNode || mate_[j] != kNoNode ? 1 : 0;
+    }
+    std::fill(changed + count, changed + padded_to_block(count), changed[0]);
+    rate(changed, count);
   }
 
   // Numbers the nodes that are left anew, so that what a round reads is dense in memory again.
