@@ -110,8 +110,8 @@ class Batches {
      0, padded_to_block(count));
   }
 
-  // Marks the pairs that are the cheapest of both their samples in mate_, the cheapest `most` of them. Returns
-  // whether there is any.
+  // Marks the pairs that are the cheapest of both their samples in mate_, the cheapest `most` of them.
+  // Returns whether there is any.
   bool find_pairs(std::size_t most) {
     accept_offers();
     const auto mark = [&](std::size_t begin, std::size_t end) {
@@ -130,8 +130,8 @@ class Batches {
     return pairs > 0;
   }
 
-  // Rows need not be symmetric: a node that is listed by one that it does not list itself learns so here where
-  // that makes its cheapest pair.
+  // Rows need not be symmetric: a node that is listed by one that it does not list itself learns so here
+  // where that makes its cheapest pair.
   void accept_offers() {
     struct Offer {
       float cost;

@@ -84,7 +84,7 @@ POINTWRIGHT_DECLARE_KERNEL(void contract_pairs_kernel(const PairKernelArgs& args
 /// The cheapest pairs of the nodes live[begin] .. live[end - 1], begin at a whole block.
 POINTWRIGHT_DECLARE_KERNEL(void best_partners_kernel(const PartnerKernelArgs& args, std::size_t begin,
                                                      std::size_t end))
-/// Brings the rows of the nodes live[begin] .. live[end - 1] up to date. A contracted node gets what both had,
-/// without repetitions, the nearest where that is too many; others may list a node twice.
+/// Brings the rows of the nodes live[begin] .. live[end - 1] up to date. A contracted node gets what both
+/// had, without repetitions, the nearest where that is too many; others may list a node twice.
 POINTWRIGHT_DECLARE_KERNEL(void merge_rows_kernel(const RowKernelArgs& args, std::size_t begin,
                                                   std::size_t end))
