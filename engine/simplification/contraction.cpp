@@ -22,7 +22,7 @@ float unit_scale(const Points& position) {
 
 ContractionNodes::ContractionNodes(const Points& position, const Points& normal, const NeighborGraph& graph,
                                    bool separate_sheets, const ExecutionContext* context)
-    : nodes_(std::make_unique_for_overwrite<ContractionNode[]>(padded_to_block(position.size()))),
+    : nodes_(make_large_array<ContractionNode>(padded_to_block(position.size()))),
       count_(position.size()),
       scale_(unit_scale(position)) {
   const NodeKernelArgs args{.x = position.x(),
@@ -42,49 +42,23 @@ ContractionNodes::ContractionNodes(const Points& position, const Points& normal,
       kParallelBlock, context);
 }
 
-void ContractionNodes::compact(const std::vector<std::uint32_t>& source) {
-  if (!spare_) spare_ = std::make_unique_for_overwrite<ContractionNode[]>(padded_to_block(source.size()));
-  parallel_for(source.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) spare_[i] = nodes_[source[i]];
-  });
-  nodes_.swap(spare_);
-  count_ = source.size();
+void ContractionNodes::compact(const std::uint32_t* source, std::size_t count) {
+  pointwright::compact(nodes_, source, count);
+  count_ = count;
 }
 
-void ContractionNodes::costs(const ContractionGoal& goal, const std::uint32_t* first,
-                             const std::uint32_t* second, std::size_t count, float* cost) const {
+void ContractionNodes::costs(const PairCost& rule, const std::uint32_t* first, const std::uint32_t* second,
+                             std::size_t count, float* cost) const {
   POINTWRIGHT_KERNEL(contract_pairs_kernel)
-  ({.nodes = nodes_[0].fields,
-    .first = first,
-    .second = second,
-    .length_weight = goal.length_weight,
-    .limit = goal.limit,
-    .separate_sheets = goal.separate_sheets,
-    .cost = cost,
-    .merged = nullptr},
+  ({.nodes = data(), .first = first, .second = second, .rule = rule, .cost = cost, .merged = nullptr}, 0,
+   padded_to_block(count));
+}
+
+void ContractionNodes::contract(const std::uint32_t* first, const std::uint32_t* second, std::size_t count,
+                                ContractionNode* merged) const {
+  POINTWRIGHT_KERNEL(contract_pairs_kernel)
+  ({.nodes = data(), .first = first, .second = second, .rule = {}, .cost = nullptr, .merged = merged->fields},
    0, padded_to_block(count));
-}
-
-void ContractionNodes::contract(std::span<const ContractionPair> pairs,
-                                std::vector<ContractionNode>& merged) const {
-  const std::size_t padded = padded_to_block(pairs.size());
-  std::vector<std::uint32_t> first(padded, 0U);
-  std::vector<std::uint32_t> second(padded, 0U);
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    first[i] = pairs[i].first;
-    second[i] = pairs[i].second;
-  }
-  merged.resize(padded);
-  POINTWRIGHT_KERNEL(contract_pairs_kernel)
-  ({.nodes = nodes_[0].fields,
-    .first = first.data(),
-    .second = second.data(),
-    .length_weight = 0.0F,
-    .limit = 0.0F,
-    .separate_sheets = false,
-    .cost = nullptr,
-    .merged = merged.data()->fields},
-   0, padded);
 }
 
 std::uint32_t starting_row(const Points& position, const NeighborGraph& graph, std::size_t i,

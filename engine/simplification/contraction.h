@@ -11,6 +11,7 @@
 #include "engine/core/execution_context.h"
 #include "engine/core/points.h"
 #include "engine/simplification/contraction_kernels.h"
+#include "engine/simplification/large_array.h"
 #include "engine/simplification/simplification.h"
 #include "engine/spatial/neighbor_graph.h"
 
@@ -20,45 +21,38 @@ namespace pointwright {
 struct alignas(64) ContractionNode {
   float fields[kNodeFloats];
 };
+/// And its neighbours.
+struct alignas(64) ContractionRow {
+  std::uint32_t neighbor[kRowNeighbors];
+};
 
 /// Neighbours that a sample brings along at most; a contracted one keeps kRowNeighbors.
 inline constexpr std::uint32_t kStartNeighbors = 12;
 
-struct ContractionPair {
-  std::uint32_t first = 0;  ///< first < second
-  std::uint32_t second = 0;
-  float cost = 0.0F;
-};
-
 /// When to stop, and what a pair may cost; lengths in the nodes' scale.
 struct ContractionGoal {
-  std::size_t count = 1;                                 ///< samples to be left
-  float limit = std::numeric_limits<float>::infinity();  ///< of the quadric part
-  float length_weight = 0.0F;
-  bool separate_sheets = true;
+  std::size_t count = 1;  ///< samples to be left
+  PairCost rule{
+      .length_weight = 0.0F, .limit = std::numeric_limits<float>::infinity(), .separate_sheets = true};
 };
 
-/// The contractions as they were made. Both orders fill it; finish_simplification() brings it in order of
-/// cost.
+/// The contractions as they were made. Both orders fill it; simplify() brings it in order of cost.
 struct ContractionLog {
-  struct State {
-    float position[3];
+  struct alignas(64) Step {   // a cache line: the order of cost is as good as random
+    Contraction contraction;  ///< its error in the nodes' scale
+    float cost;               ///< never less than those of the steps that it builds on
+    float position[3];        ///< of the survivor
     float normal[3];
+    std::uint32_t neighbor_count;
+    std::uint64_t first_neighbor;
   };
-  struct Row {
-    std::uint32_t chunk = 0;
-    std::uint32_t first = 0;
-    std::uint32_t count = 0;
-  };
-  std::vector<Contraction> steps;  ///< errors in the nodes' scale
-  std::vector<float> cost;         ///< of each step, never less than those of the steps that it builds on
-  std::vector<State> state;        ///< of the survivor
-  std::vector<Row> row;            ///< the survivor's neighbours, in one of the chunks
-  std::vector<std::vector<std::uint32_t>> chunks;
+  LargeArray<Step> steps;  ///< not touched, so not resident, beyond the count
+  std::size_t count = 0;
+  LargeArray<std::uint32_t> neighbors;  ///< of the survivors
 };
 
-/// The nodes of the samples, and one buffer's worth of kernel calls over them. The scale is a power of two
-/// that brings the cloud's extent near 1, so that squares of squares neither vanish nor overflow.
+/// The nodes of the samples, and kernel calls over them. The scale is a power of two that brings the cloud's
+/// extent near 1, so that squares of squares neither vanish nor overflow.
 class ContractionNodes {
  public:
   ContractionNodes(const Points& position, const Points& normal, const NeighborGraph& graph,
@@ -67,20 +61,21 @@ class ContractionNodes {
   [[nodiscard]] float scale() const { return scale_; }
   [[nodiscard]] std::size_t count() const { return count_; }
   [[nodiscard]] const ContractionNode& operator[](std::size_t i) const { return nodes_[i]; }
+  [[nodiscard]] const float* data() const { return nodes_[0].fields; }
   void set(std::size_t i, const ContractionNode& node) { nodes_[i] = node; }
-  /// Leaves the nodes source[0], source[1], ... (ascending), which get the numbers 0, 1, ...
-  void compact(const std::vector<std::uint32_t>& source);
+  /// Leaves the nodes source[0], source[1], ..., which get the numbers 0, 1, ...
+  void compact(const std::uint32_t* source, std::size_t count);
 
   /// Costs of the pairs (first[i], second[i]). The columns have room for whole blocks, the pairs' with valid
   /// indices.
-  void costs(const ContractionGoal& goal, const std::uint32_t* first, const std::uint32_t* second,
-             std::size_t count, float* cost) const;
-  /// The contracted nodes, which are not stored yet.
-  void contract(std::span<const ContractionPair> pairs, std::vector<ContractionNode>& merged) const;
+  void costs(const PairCost& rule, const std::uint32_t* first, const std::uint32_t* second, std::size_t count,
+             float* cost) const;
+  /// The contracted nodes, which are not stored yet; columns as above.
+  void contract(const std::uint32_t* first, const std::uint32_t* second, std::size_t count,
+                ContractionNode* merged) const;
 
  private:
-  std::unique_ptr<ContractionNode[]> nodes_;
-  std::unique_ptr<ContractionNode[]> spare_;  // where compact() writes
+  LargeArray<ContractionNode> nodes_;
   std::size_t count_ = 0;
   float scale_ = 1.0F;
 };

@@ -13,6 +13,12 @@ namespace pointwright {
 /// number of samples that the node stands for.
 inline constexpr std::size_t kNodeFloats = 16;
 
+/// Neighbours of a node, a cache line: what is left of them comes first, the node's own number fills up.
+inline constexpr std::uint32_t kRowNeighbors = 16;
+
+/// No node: of a node without partner.
+inline constexpr std::uint32_t kNoNode = 0xffffffffU;
+
 /// Padded columns; `neighbors` is the blocked graph, [block][j][lane].
 struct NodeKernelArgs {
   const float* x;
@@ -28,42 +34,43 @@ struct NodeKernelArgs {
   float* nodes;          ///< padded samples x kNodeFloats
 };
 
+/// What a pair costs: the same bits whichever of its nodes comes first.
+struct PairCost {
+  float length_weight;
+  float limit;           ///< of the quadric part; beyond it a pair costs infinity
+  bool separate_sheets;  ///< pairs of opposed normals cost infinity
+};
+
 /// Pairs of nodes, first < second, padded to whole blocks of 16 with any valid pair.
 struct PairKernelArgs {
   const float* nodes;
   const std::uint32_t* first;
   const std::uint32_t* second;
-  float length_weight;
-  float limit;           ///< of the quadric part; beyond it a pair costs infinity
-  bool separate_sheets;  ///< pairs of opposed normals cost infinity
-  float* cost;           ///< where not null: of each pair
-  float* merged;         ///< where not null: the contracted nodes, kNodeFloats each
+  PairCost rule;
+  float* cost;    ///< where not null: of each pair
+  float* merged;  ///< where not null: the contracted nodes, kNodeFloats each
 };
 
-/// Entries of a node's row of neighbours, and the bit that marks a number of map[] as contracted.
-inline constexpr std::uint32_t kRowNeighbors = 16;
-inline constexpr std::uint32_t kChanged = 1U << 31U;
-
-struct ContractionRow {
-  std::uint32_t neighbor[kRowNeighbors];
-  float cost[kRowNeighbors];
+/// The list `live` is padded to whole blocks with any of its nodes; all else is addressed by node.
+struct PartnerKernelArgs {
+  const float* nodes;
+  const std::uint32_t* rows;  ///< kRowNeighbors a node
+  const std::uint32_t* live;
+  PairCost rule;
+  float* cost;             ///< of each node's cheapest pair over its own row; infinity without one
+  std::uint32_t* key;      ///< of that pair: orders pairs of equal cost as if at random
+  std::uint32_t* partner;  ///< or kNoNode; where cost and key are equal, too, the lower one
 };
 
-/// Node i of the new numbering was source[i] of the old one, contracted with partner[source[i]] where that is
-/// not 0xffffffff; map[] takes old numbers to new ones. Outputs are appended from 0; each has room for two
-/// rows a node.
+/// `mate` is what a node of the list has been contracted with, or kNoNode; `forward` takes every node to what
+/// it is part of now.
 struct RowKernelArgs {
-  const ContractionRow* rows;
-  const std::uint8_t* length;
-  const std::uint32_t* map;
-  const std::uint32_t* source;
-  const std::uint32_t* partner;
-  std::uint32_t* neighbor;
-  float* cost;             ///< the old one, valid where the entry is no pair below
-  std::uint32_t* row_end;  ///< of each node of the range, in `neighbor`
-  std::uint32_t* first;    ///< pairs whose cost has changed, and where in `neighbor` they stand
-  std::uint32_t* second;
-  std::uint32_t* target;
+  const float* nodes;
+  const std::uint32_t* forward;
+  const std::uint32_t* live;
+  const std::uint32_t* mate;
+  std::uint32_t* rows;
+  std::uint8_t* length;  ///< of contracted nodes, from `begin` on: entries of the new row
 };
 
 }  // namespace pointwright
@@ -74,7 +81,10 @@ POINTWRIGHT_DECLARE_KERNEL(void build_nodes_kernel(const NodeKernelArgs& args, s
 /// Costs or results of contracting the pairs [begin, end), begin at a whole block.
 POINTWRIGHT_DECLARE_KERNEL(void contract_pairs_kernel(const PairKernelArgs& args, std::size_t begin,
                                                       std::size_t end))
-/// Rows of the nodes [begin, end) under their new names, without repetitions; returns how many pairs have
-/// changed.
-POINTWRIGHT_DECLARE_KERNEL(std::size_t merge_rows_kernel(const RowKernelArgs& args, std::size_t begin,
-                                                         std::size_t end))
+/// The cheapest pairs of the nodes live[begin] .. live[end - 1], begin at a whole block.
+POINTWRIGHT_DECLARE_KERNEL(void best_partners_kernel(const PartnerKernelArgs& args, std::size_t begin,
+                                                     std::size_t end))
+/// Brings the rows of the nodes live[begin] .. live[end - 1] up to date. A contracted node gets what both
+/// had, without repetitions, the nearest where that is too many; others may list a node twice.
+POINTWRIGHT_DECLARE_KERNEL(void merge_rows_kernel(const RowKernelArgs& args, std::size_t begin,
+                                                  std::size_t end))

@@ -29,9 +29,10 @@ class Greedy {
   }
 
   bool run(const Points& position, const NeighborGraph& graph) {
+    log_.steps = make_large_array<ContractionLog::Step>(position.size() - goal_.count);
     connect(position, graph);
     for (std::size_t left = position.size(); left > goal_.count; --left) {
-      if (log_.steps.size() % kCancelInterval == 0 && is_cancelled()) return false;
+      if (log_.count % kCancelInterval == 0 && is_cancelled()) return false;
       if (!drop_outdated()) {
         keep_live();
         const SurvivorGraph survivors = survivor_graph(nodes_, context_);
@@ -41,8 +42,10 @@ class Greedy {
       }
       const Candidate best = heap_.top();
       heap_.pop();
-      contract({best.first, best.second, best.cost});
+      contract(best);
     }
+    log_.neighbors = make_large_array<std::uint32_t>(neighbors_.size());
+    std::copy(neighbors_.begin(), neighbors_.end(), log_.neighbors.get());
     return !is_cancelled();
   }
 
@@ -65,7 +68,7 @@ class Greedy {
     for (std::uint32_t i = 0; i < id_.size(); ++i) {
       if (is_live_[i]) live.push_back(i);
     }
-    nodes_.compact(live);
+    nodes_.compact(live.data(), live.size());
     for (std::size_t l = 0; l < live.size(); ++l) {
       id_[l] = id_[live[l]];
       node_cost_[l] = node_cost_[live[l]];
@@ -104,7 +107,7 @@ class Greedy {
     first_.resize(padded_to_block(others.size()), 0U);
     second_.resize(first_.size(), 0U);
     cost_.resize(first_.size());
-    nodes_.costs(goal_, first_.data(), second_.data(), others.size(), cost_.data());
+    nodes_.costs(goal_.rule, first_.data(), second_.data(), others.size(), cost_.data());
     for (std::size_t o = 0; o < others.size(); ++o) {
       if (!(cost_[o] < std::numeric_limits<float>::infinity())) continue;
       heap_.push({cost_[o], tie_key(id_[first_[o]], id_[second_[o]]), first_[o], second_[o],
@@ -125,12 +128,15 @@ class Greedy {
     return false;
   }
 
-  void contract(const ContractionPair& pair) {
+  void contract(const Candidate& pair) {
     const std::uint32_t a = pair.first;
     const std::uint32_t b = pair.second;
-    nodes_.contract(std::span(&pair, 1), merged_);
-    nodes_.set(a, merged_.front());
-    const float* f = merged_.front().fields;
+    std::uint32_t first[kSimdBlock] = {a};
+    std::uint32_t second[kSimdBlock] = {b};
+    ContractionNode merged[kSimdBlock];
+    nodes_.contract(first, second, 1, merged);
+    nodes_.set(a, merged[0]);
+    const float* f = merged[0].fields;
     node_cost_[a] = std::max({pair.cost, node_cost_[a], node_cost_[b]});
     std::vector<std::uint32_t> joined;
     std::set_union(adjacent_[a].begin(), adjacent_[a].end(), adjacent_[b].begin(), adjacent_[b].end(),
@@ -141,13 +147,13 @@ class Greedy {
       std::erase_if(row, [&](std::uint32_t y) { return y == a || y == b; });
       row.insert(std::upper_bound(row.begin(), row.end(), a), a);
     }
-    log_.steps.push_back({id_[a], id_[b], std::sqrt(f[12])});
-    log_.cost.push_back(node_cost_[a]);
-    log_.state.push_back({{f[0], f[1], f[2]}, {f[13], f[14], f[15]}});
-    log_.row.push_back(
-        {static_cast<std::uint32_t>(log_.chunks.size()), 0, static_cast<std::uint32_t>(joined.size())});
-    log_.chunks.push_back(joined);
-    for (std::uint32_t& x : log_.chunks.back()) x = id_[x];
+    log_.steps[log_.count++] = {.contraction = {id_[a], id_[b], std::sqrt(f[12])},
+                                .cost = node_cost_[a],
+                                .position = {f[0], f[1], f[2]},
+                                .normal = {f[13], f[14], f[15]},
+                                .neighbor_count = static_cast<std::uint32_t>(joined.size()),
+                                .first_neighbor = neighbors_.size()};
+    for (const std::uint32_t x : joined) neighbors_.push_back(id_[x]);
     is_live_[b] = false;
     ++version_[a];
     adjacent_[b] = {};
@@ -163,11 +169,11 @@ class Greedy {
   std::vector<std::uint32_t> version_;
   std::vector<float> node_cost_;
   std::vector<bool> is_live_;
-  std::vector<std::uint32_t> id_;  // indices into the input, ascending
+  std::vector<std::uint32_t> id_;         // indices into the input, ascending
+  std::vector<std::uint32_t> neighbors_;  // the log's
   std::priority_queue<Candidate> heap_;
   std::vector<std::uint32_t> first_, second_;  // buffers
   std::vector<float> cost_;
-  std::vector<ContractionNode> merged_;
 };
 
 }  // namespace

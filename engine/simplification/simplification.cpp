@@ -3,9 +3,13 @@
 #include "engine/simplification/simplification.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "engine/core/out_of_range.h"
@@ -20,35 +24,47 @@ constexpr float kMaxLengthWeight = 10.0F;
 
 // The log in order of cost, its first `count` contractions; lengths back in model units.
 ContractionRecord ordered_record(const ContractionLog& log, std::size_t count, float scale) {
-  std::vector<std::uint64_t> keys(log.steps.size());
-  std::vector<std::uint32_t> order(log.steps.size());
-  std::iota(order.begin(), order.end(), 0U);
+  std::vector<std::uint64_t> keys(log.count);
+  std::vector<std::uint32_t> order(log.count);
   // Costs are not negative, so their bits order them; the sort is stable and no step costs less than those
   // that it builds on, which were made before it.
-  for (std::size_t s = 0; s < keys.size(); ++s) keys[s] = std::bit_cast<std::uint32_t>(log.cost[s]);
+  parallel_for(log.count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      keys[s] = std::bit_cast<std::uint32_t>(log.steps[s].cost);
+      order[s] = static_cast<std::uint32_t>(s);
+    }
+  });
   sort_by_key(keys, order);
-  order.resize(count);
   ContractionRecord record;
-  record.steps.resize(count);
-  record.position.resize(count);
-  record.normal.resize(count);
-  record.neighbor_first.assign(count + 1, 0);
-  for (std::size_t s = 0; s < count; ++s) {
-    record.neighbor_first[s + 1] = record.neighbor_first[s] + log.row[order[s]].count;
-  }
-  record.neighbor.resize(record.neighbor_first[count]);
+  record.neighbor_first.resize(count + 1);
+  // The log's lines are anywhere in memory: asked for long before they are read.
+  constexpr std::size_t kAhead = 16;
+  parallel_for(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      if (s + kAhead < end) __builtin_prefetch(&log.steps[order[s + kAhead]]);
+      record.neighbor_first[s + 1] = log.steps[order[s]].neighbor_count;
+    }
+  });
+  std::partial_sum(record.neighbor_first.begin(), record.neighbor_first.end(), record.neighbor_first.begin());
+  // Zeroing the columns is what costs most in their first use: several at a time.
+  const std::function<void()> columns[] = {
+      [&] { record.neighbor.resize(record.neighbor_first[count]); }, [&] { record.steps.resize(count); },
+      [&] { record.position.resize(count); }, [&] { record.normal.resize(count); }};
+  parallel_for(
+      std::size(columns), [&](std::size_t c, std::size_t) { columns[c](); }, 1);
   const float inverse = 1.0F / scale;
   parallel_for(count, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
-      const auto& [p, n] = log.state[order[s]];
-      record.steps[s] = log.steps[order[s]];
+      if (s + 2 * kAhead < end) __builtin_prefetch(&log.steps[order[s + 2 * kAhead]]);
+      if (s + kAhead < end) __builtin_prefetch(&log.neighbors[log.steps[order[s + kAhead]].first_neighbor]);
+      const ContractionLog::Step& step = log.steps[order[s]];
+      const float* p = step.position;
+      record.steps[s] = step.contraction;
       record.steps[s].error *= inverse;
       record.position.set(s, {p[0] * inverse, p[1] * inverse, p[2] * inverse});
-      record.normal.set(s, {n[0], n[1], n[2]});
-      const auto& [chunk, first, neighbors] = log.row[order[s]];
-      const auto from = log.chunks[chunk].begin() + first;
-      std::copy(from, from + neighbors,
-                record.neighbor.begin() + static_cast<std::ptrdiff_t>(record.neighbor_first[s]));
+      record.normal.set(s, {step.normal[0], step.normal[1], step.normal[2]});
+      std::copy_n(&log.neighbors[step.first_neighbor], step.neighbor_count,
+                  record.neighbor.data() + record.neighbor_first[s]);
     }
   });
   return record;
@@ -65,14 +81,22 @@ void settle(const Points& position, const Points& normal, Simplification& result
     Vec3d normal = Vec3d::Zero();
     double count = 0.0;
   };
-  std::vector<Sum> sums(result.kept.size());
-  for (std::size_t i = 0; i < position.size(); ++i) {
-    Sum& sum = sums[result.parent[i]];
-    sum.position += position[i].cast<double>();
-    const double side = normal[i].dot(result.normal[result.parent[i]]) < 0.0F ? -1.0 : 1.0;
-    sum.normal += side * normal[i].cast<double>();
-    sum.count += 1.0;
-  }
+  // Every range of survivors goes over the samples from its first on: survivors are the first of their own.
+  constexpr std::size_t kRanges = 4;
+  const std::size_t kept = result.kept.size();
+  std::vector<Sum> sums(kept);
+  const auto sum_up = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = result.kept[begin]; i < position.size(); ++i) {
+      const std::uint32_t m = result.parent[i];
+      if (m < begin || m >= end) continue;
+      Sum& sum = sums[m];
+      sum.position += position[i].cast<double>();
+      const double side = normal[i].dot(result.normal[m]) < 0.0F ? -1.0 : 1.0;
+      sum.normal += side * normal[i].cast<double>();
+      sum.count += 1.0;
+    }
+  };
+  parallel_for(kept, sum_up, (kept + kRanges - 1) / kRanges);
   parallel_for(sums.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t m = begin; m < end; ++m) {
       const Sum& sum = sums[m];
@@ -86,35 +110,72 @@ void settle(const Points& position, const Points& normal, Simplification& result
   });
 }
 
+// The greatest of all offers, whatever their order.
+void raise(std::uint32_t& value, std::uint32_t offer) {
+  const std::atomic_ref<std::uint32_t> ref(value);
+  std::uint32_t current = ref.load(std::memory_order_relaxed);
+  while (current < offer && !ref.compare_exchange_weak(current, offer, std::memory_order_relaxed)) {
+  }
+}
+
 // Every column of the result but the record, which has all the contractions to be done.
 void apply_record(const Points& position, const Points& normal, Simplification& result) {
   const std::size_t n = position.size();
   const ContractionRecord& record = result.record;
-  constexpr std::uint32_t kNone = 0xffffffffU;
-  std::vector<std::uint32_t> last_step(n, kNone);
-  std::vector<std::uint32_t> survivor(n);
-  std::iota(survivor.begin(), survivor.end(), 0U);
-  for (std::size_t s = 0; s < record.steps.size(); ++s) {
-    last_step[record.steps[s].survivor] = static_cast<std::uint32_t>(s);
-    survivor[record.steps[s].removed] = record.steps[s].survivor;
-  }
+  const auto last_step = make_large_array<std::uint32_t>(n);  // + 1; 0 for none
+  const auto survivor = make_large_array<std::uint32_t>(n);
+  parallel_for(n, [&](std::size_t begin, std::size_t end) {
+    std::fill(last_step.get() + begin, last_step.get() + end, 0U);
+    std::iota(survivor.get() + begin, survivor.get() + end, static_cast<std::uint32_t>(begin));
+  });
+  parallel_for(record.steps.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      const Contraction& step = record.steps[s];
+      survivor[step.removed] = step.survivor;
+      raise(last_step[step.survivor], static_cast<std::uint32_t>(s + 1));
+    }
+  });
+  result.parent.resize(n);
   for (std::uint32_t i = 0; i < n; ++i) {
-    if (survivor[i] == i) result.kept.push_back(i);
+    if (survivor[i] == i) {
+      result.parent[i] = static_cast<std::uint32_t>(result.kept.size());
+      result.kept.push_back(i);
+    } else {
+      result.parent[i] = result.parent[survivor[i]];  // which comes before i
+    }
   }
   result.position.resize(result.kept.size());
   result.normal.resize(result.kept.size());
-  result.parent.resize(n);
-  for (std::uint32_t m = 0; m < result.kept.size(); ++m) {
-    const std::uint32_t i = result.kept[m];
-    const std::uint32_t s = last_step[i];
-    result.position.set(m, s == kNone ? position[i] : record.position[s]);
-    result.normal.set(m, s == kNone ? normal[i] : record.normal[s]);
-    result.parent[i] = m;
-  }
-  for (std::size_t s = record.steps.size(); s-- > 0;) {
-    result.parent[record.steps[s].removed] = result.parent[record.steps[s].survivor];
-  }
+  parallel_for(result.kept.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t m = begin; m < end; ++m) {
+      const std::uint32_t i = result.kept[m];
+      const std::uint32_t steps = last_step[i];
+      result.position.set(m, steps == 0 ? position[i] : record.position[steps - 1]);
+      result.normal.set(m, steps == 0 ? normal[i] : record.normal[steps - 1]);
+    }
+  });
   if (result.placement == Placement::kOnSurface && !record.steps.empty()) settle(position, normal, result);
+}
+
+// Contractions down to `count` samples, or as far as the parameters let them go; nothing where cancelled.
+std::optional<ContractionRecord> contraction_record(const Points& position, const Points& normal,
+                                                    const NeighborGraph& graph, const SimplifyParams& params,
+                                                    std::size_t count, const ExecutionContext* context) {
+  ContractionLog log;
+  float scale = 1.0F;
+  {  // the log is ordered when the nodes' memory is free again
+    ContractionNodes nodes(position, normal, graph, params.separate_sheets, context);
+    scale = nodes.scale();
+    ContractionGoal goal{.count = count};
+    goal.rule.length_weight = params.length_weight;
+    goal.rule.separate_sheets = params.separate_sheets;
+    if (const auto* within = std::get_if<KeepWithin>(&params.target)) {
+      goal.rule.limit = within->error * scale * (within->error * scale);
+    }
+    const auto contract = params.order == ContractionOrder::kGreedy ? contract_greedily : contract_in_batches;
+    if (!contract(position, graph, goal, nodes, log, context)) return std::nullopt;
+  }
+  return ordered_record(log, std::min(log.count, position.size() - count), scale);
 }
 
 }  // namespace
@@ -154,22 +215,16 @@ Result<Simplification> simplify(const Points& position, const Points& normal, co
   Simplification result{.placement = params.placement};
   result.record.neighbor_first.assign(1, 0);
   if (n == 0) return result;
-  ContractionNodes nodes(position, normal, graph, params.separate_sheets, context);
-  ContractionGoal goal{.length_weight = params.length_weight, .separate_sheets = params.separate_sheets};
-  if (const auto* count = std::get_if<KeepCount>(&params.target)) goal.count = std::min(n, count->count);
+  std::size_t count = 1;
+  if (const auto* keep = std::get_if<KeepCount>(&params.target)) count = std::min(n, keep->count);
   if (const auto* keep = std::get_if<KeepRatio>(&params.target)) {
-    goal.count = std::max<std::size_t>(
+    count = std::max<std::size_t>(
         1, static_cast<std::size_t>(std::llround(keep->ratio * static_cast<double>(n))));
   }
-  if (const auto* within = std::get_if<KeepWithin>(&params.target)) {
-    const float error = within->error * nodes.scale();
-    goal.limit = error * error;
-  }
-  if (goal.count < n) {
-    ContractionLog log;
-    const auto contract = params.order == ContractionOrder::kGreedy ? contract_greedily : contract_in_batches;
-    if (!contract(position, graph, goal, nodes, log, context)) return cancelled_error();
-    result.record = ordered_record(log, std::min(log.steps.size(), n - goal.count), nodes.scale());
+  if (count < n) {
+    auto record = contraction_record(position, normal, graph, params, count, context);
+    if (!record) return cancelled_error();
+    result.record = std::move(*record);
   }
   apply_record(position, normal, result);
   return result;

@@ -94,7 +94,7 @@ struct Simplification {
 /// Shapes:      N samples in coherent order, N unit normals, their graph. More than the target are kept only
 ///              where the rest are opposed sheets; far parts are joined when their own samples are used up
 /// Errors:      kInvalidArgument, kTooLarge (2^27 samples), kCancelled
-/// Cost:        kGreedy O(N k log N), one thread; kBatched O(N k), parallel; about 500 bytes a sample while
+/// Cost:        kGreedy O(N k log N), one thread; kBatched O(N k), parallel; about 270 bytes a sample while
 ///              it runs
 /// Determinism: bitwise equal for any thread count and instruction set
 /// Cancels:     between rounds and between blocks of samples
