@@ -119,6 +119,16 @@ void apply_record(const Points& position, const Points& normal, Simplification& 
 
 }  // namespace
 
+std::size_t kept_of(const KeepCount& target, std::size_t sample_count) {
+  return std::min(sample_count, target.count);
+}
+
+std::size_t kept_of(const KeepRatio& target, std::size_t sample_count) {
+  const auto rounded =
+      static_cast<std::size_t>(std::llround(target.ratio * static_cast<double>(sample_count)));
+  return std::min(sample_count, std::max<std::size_t>(1, rounded));
+}
+
 Result<void> validate(const SimplifyParams& params) {
   if (const auto* keep = std::get_if<KeepCount>(&params.target); keep != nullptr && keep->count < 1) {
     return out_of_range("at least one sample must be kept", "target.count", 1, 0);
@@ -156,11 +166,8 @@ Result<Simplification> simplify(const Points& position, const Points& normal, co
   if (n == 0) return result;
   ContractionNodes nodes(position, normal, graph, params.separate_sheets, context);
   ContractionGoal goal{.length_weight = params.length_weight, .separate_sheets = params.separate_sheets};
-  if (const auto* count = std::get_if<KeepCount>(&params.target)) goal.count = std::min(n, count->count);
-  if (const auto* keep = std::get_if<KeepRatio>(&params.target)) {
-    goal.count = std::max<std::size_t>(
-        1, static_cast<std::size_t>(std::llround(keep->ratio * static_cast<double>(n))));
-  }
+  if (const auto* keep = std::get_if<KeepCount>(&params.target)) goal.count = kept_of(*keep, n);
+  if (const auto* keep = std::get_if<KeepRatio>(&params.target)) goal.count = kept_of(*keep, n);
   if (const auto* within = std::get_if<KeepWithin>(&params.target)) {
     const float error = within->error * nodes.scale();
     goal.limit = error * error;
