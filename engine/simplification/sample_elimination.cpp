@@ -19,13 +19,16 @@ namespace {
 
 // On a surface with six samples for each that stays there are 24 within r.
 constexpr std::uint32_t kNeighbors = 24;
+// Few, so that on curves and near borders the room is hardly taken for more than it is.
+constexpr std::uint32_t kRoomNeighbors = 6;
 constexpr std::size_t kFewCut = 8;  // an eighth of the lists may end before r
 // A little farther than Yuksel's, who has many times more samples to choose from: 1 leaves greater gaps, 1.1
 // less distance.
 constexpr double kReach = 1.05;
-// Yuksel's beta and gamma.
-constexpr double kClumpShare = 0.65;
-constexpr double kClumpPower = 1.5;
+constexpr double kClumpShare = 0.65;  // Yuksel's beta; his gamma is 3/2
+// Nearer than that weights grow by this, linearly: all the same, as he has them, they leave adjacent pairs of
+// a lattice.
+constexpr float kSlope = 0.5F;
 
 constexpr std::size_t blocks_of(std::size_t count) {
   return (count + kParallelBlock - 1) / kParallelBlock;
@@ -163,17 +166,20 @@ void Eliminator::find_neighbors(std::uint32_t length) {
           std::int32_t* const list =
               lists.data() + (i - begin) / kSimdBlock * length_ * kSimdBlock + i % kSimdBlock;
           std::uint32_t allies = 0;
+          std::uint32_t farthest = static_cast<std::uint32_t>(i);  // of the allies that tell the room
           for (std::uint32_t j = 0; j < length_; ++j) {
             std::int32_t& other = list[j * kSimdBlock];
             last_[i] = static_cast<std::uint32_t>(other);
-            if (same_side(i, last_[i])) {
-              ++allies;
-            } else {
+            if (!same_side(i, last_[i])) {
               other = -1;
+            } else if (allies < kRoomNeighbors) {
+              farthest = last_[i];
+              ++allies;
             }
           }
           reach_sq_[i] = distance_sq(position_, i, last_[i]);
-          area_[i] = std::numbers::pi_v<float> * reach_sq_[i] / (static_cast<float>(allies) + 0.5F);
+          const float room_sq = allies > 0 ? distance_sq(position_, i, farthest) : reach_sq_[i];
+          area_[i] = std::numbers::pi_v<float> * room_sq / (static_cast<float>(allies) + 0.5F);
         }
       },
       kParallelBlock, context_);
@@ -206,7 +212,7 @@ void Eliminator::find_radius() {
   const double radius = kReach * std::sqrt(2.0 * t / std::numbers::sqrt3);
   const double ratio = static_cast<double>(wanted_) / static_cast<double>(count_);
   radius_ = static_cast<float>(radius);
-  clump_ = static_cast<float>(kClumpShare * (1.0 - std::pow(ratio, kClumpPower)) * radius);
+  clump_ = static_cast<float>(kClumpShare * (1.0 - ratio * std::sqrt(ratio)) * radius);
 }
 
 // Whether more than a few lists end before the radius does: two sheets fill them twice as fast.
@@ -247,8 +253,10 @@ void Eliminator::weigh_pairs() {
             const float one = 1.0F - std::max(d, clump_) / radius_;
             const float four = (one * one) * (one * one);
             pairs.other[at] = other;
-            pairs.weight[at++] = four * four;
-            sum += share_of(four * four);
+            const float nearer = std::max(0.0F, 1.0F - d / clump_);
+            const float weight = four * four * (1.0F + kSlope * nearer);
+            pairs.weight[at++] = weight;
+            sum += share_of(weight);
           }
           row_[i] = {first, at - first};
           weight_[i] = sum;

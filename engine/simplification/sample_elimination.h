@@ -17,7 +17,7 @@ namespace pointwright {
 /// rounds that take all such samples at once, until nothing heavier than what must go is left, are the
 /// one-at-a-time order in parallel. r is 1.05 of the distance at which `wanted` samples in a hexagonal
 /// pattern cover the area that there is, by the room that each sample has. Where many samples go, nearby
-/// neighbours weigh all the same (Yuksel's limit, 0.65 r), or the clumps of the input would decide.
+/// neighbours weigh nearly the same (Yuksel's limit, 0.65 r), or the clumps of the input would decide.
 /// Shapes:      N samples, N normals or none; N - wanted indices
 /// Pre:         coherent order makes it fast; few samples in one place; 1 <= wanted < N
 /// Cost:        O(N k) for k = 24, parallel; about 400 bytes a sample while it runs
