@@ -18,8 +18,9 @@ namespace {
 
 using namespace test;
 
-// In ten-thousandths of the diagonal, at most: root mean square and greatest distance of the scan's samples to
-// the planes of the samples that stand for them, and of the kept samples to the plane of the scan's nearest.
+// In ten-thousandths of the diagonal, at most: root mean square and greatest distance of the scan's samples
+// to the planes of the samples that stand for them, and of the kept samples to the plane of the scan's
+// nearest.
 struct Limits {
   double to_planes;
   double to_planes_most;

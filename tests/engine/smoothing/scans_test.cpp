@@ -72,8 +72,9 @@ TEST_CASE("Figure 1 on a known scan: local preservation keeps the volume of a no
   if (!cloud) return;
   const auto rest = rest_surface(*cloud, 10, {});
   REQUIRE(rest.ok());
-  // Volumes through what the clean scan's samples have of its area, along its normals: 1/3 sum a n . p, and what
-  // a change of positions adds to that, to first order sum a (p' - p) . n. Neither reads the noisy surface.
+  // Volumes through what the clean scan's samples have of its area, along its normals: 1/3 sum a n . p, and
+  // what a change of positions adds to that, to first order sum a (p' - p) . n. Neither reads the noisy
+  // surface.
   const Points& clean = cloud->position;
   const Points& normal = rest.value().normal;
   const std::vector<float> spacing = local_spacing(clean, rest.value().graph);
