@@ -65,7 +65,8 @@ TEST_CASE("known scans are simplified no farther off than measured, and restored
     const Points& normal = rest.value().normal;
     const double unit = 1e-4 * static_cast<double>(bounds_of(position).diagonal());
     const KdTree tree(position);
-    for (const auto& [ratio, limits] : {std::pair{0.1, scan.tenth}, {0.02, scan.fiftieth}}) {
+    for (const double ratio : {0.1, 0.02}) {
+      const Limits& limits = ratio == 0.1 ? scan.tenth : scan.fiftieth;
       const auto outcome = simplify(position, normal, rest.value().graph, {.target = KeepRatio{ratio}});
       REQUIRE(outcome.ok());
       const Simplification& result = outcome.value();
