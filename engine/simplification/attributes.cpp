@@ -1,5 +1,6 @@
 #include "engine/simplification/attributes.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -89,6 +90,16 @@ Cloud simplified_cloud(const Simplification& simplified, const Cloud& cloud) {
         },
         cloud.scalars[a].values);
   }
+  return result;
+}
+
+Cloud chosen_cloud(const Cloud& cloud, const std::vector<std::uint32_t>& kept) {
+  Cloud result = permuted(cloud, kept);
+  std::vector<std::uint32_t> rank(kept.size());
+  std::iota(rank.begin(), rank.end(), 0U);
+  std::sort(rank.begin(), rank.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return cloud.id[kept[a]] < cloud.id[kept[b]]; });
+  for (std::uint32_t r = 0; r < rank.size(); ++r) result.id[rank[r]] = r;
   return result;
 }
 

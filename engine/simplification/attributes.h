@@ -1,5 +1,5 @@
 #pragma once
-// What a simplified cloud's samples bring along besides where they stand.
+// What the samples of a simplified or subsampled cloud bring along besides where they stand.
 
 #include <cstdint>
 #include <span>
@@ -28,5 +28,10 @@ std::vector<float> averaged(const Simplification& simplified, std::span<const fl
 /// Pre:  `simplified` was made of this cloud's positions
 /// Cost: O(N) a column
 Cloud simplified_cloud(const Simplification& simplified, const Cloud& cloud);
+
+/// The chosen samples with all their columns, as they were to the bit; ids count up in the caller's order.
+/// Pre:  ascending indices of `cloud`, as subsample() gives them
+/// Cost: O(M log M) for M chosen
+Cloud chosen_cloud(const Cloud& cloud, const std::vector<std::uint32_t>& kept);
 
 }  // namespace pointwright

@@ -6,9 +6,7 @@
 #include "engine/core/parallel.h"
 
 namespace pointwright {
-namespace {
 
-// The power of two that brings the longest side of the box into [1/2, 1).
 float unit_scale(const Points& position) {
   const Box3f box = bounds_of(position);
   const float extent = position.empty() ? 0.0F : (box.max - box.min).maxCoeff();
@@ -17,8 +15,6 @@ float unit_scale(const Points& position) {
   std::frexp(extent, &exponent);
   return std::ldexp(1.0F, std::clamp(-exponent, -100, 100));
 }
-
-}  // namespace
 
 ContractionNodes::ContractionNodes(const Points& position, const Points& normal, const NeighborGraph& graph,
                                    bool separate_sheets, const ExecutionContext* context)

@@ -93,6 +93,9 @@ struct SurvivorGraph {
 };
 SurvivorGraph survivor_graph(const ContractionNodes& nodes, const ExecutionContext* context);
 
+/// The power of two that brings the longest side of the box into [1/2, 1).
+float unit_scale(const Points& position);
+
 /// A bijection of 64 bits (the finaliser of SplitMix64): orders pairs of equal cost as if at random, so that
 /// on exact flats many of them are the first of both their samples.
 inline std::uint64_t tie_key(std::uint32_t first, std::uint32_t second) {

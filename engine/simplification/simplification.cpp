@@ -180,6 +180,16 @@ std::optional<ContractionRecord> contraction_record(const Points& position, cons
 
 }  // namespace
 
+std::size_t kept_of(const KeepCount& target, std::size_t sample_count) {
+  return std::min(sample_count, target.count);
+}
+
+std::size_t kept_of(const KeepRatio& target, std::size_t sample_count) {
+  const auto rounded =
+      static_cast<std::size_t>(std::llround(target.ratio * static_cast<double>(sample_count)));
+  return std::min(sample_count, std::max<std::size_t>(1, rounded));
+}
+
 Result<void> validate(const SimplifyParams& params) {
   if (const auto* keep = std::get_if<KeepCount>(&params.target); keep != nullptr && keep->count < 1) {
     return out_of_range("at least one sample must be kept", "target.count", 1, 0);
@@ -216,11 +226,8 @@ Result<Simplification> simplify(const Points& position, const Points& normal, co
   result.record.neighbor_first.assign(1, 0);
   if (n == 0) return result;
   std::size_t count = 1;
-  if (const auto* keep = std::get_if<KeepCount>(&params.target)) count = std::min(n, keep->count);
-  if (const auto* keep = std::get_if<KeepRatio>(&params.target)) {
-    count = std::max<std::size_t>(
-        1, static_cast<std::size_t>(std::llround(keep->ratio * static_cast<double>(n))));
-  }
+  if (const auto* keep = std::get_if<KeepCount>(&params.target)) count = kept_of(*keep, n);
+  if (const auto* keep = std::get_if<KeepRatio>(&params.target)) count = kept_of(*keep, n);
   if (count < n) {
     auto record = contraction_record(position, normal, graph, params, count, context);
     if (!record) return cancelled_error();

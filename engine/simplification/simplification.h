@@ -29,6 +29,9 @@ struct KeepWithin {
   float error = 0.0F;
   friend bool operator==(const KeepWithin&, const KeepWithin&) = default;
 };
+/// How many of N samples these keep.
+std::size_t kept_of(const KeepCount& target, std::size_t sample_count);
+std::size_t kept_of(const KeepRatio& target, std::size_t sample_count);
 using SimplifyTarget = std::variant<KeepCount, KeepRatio, KeepWithin>;
 
 enum class ContractionOrder {

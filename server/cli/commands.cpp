@@ -139,13 +139,17 @@ CLI::App* add_smooth(CLI::App& app, SmoothOptions& options) {
 }
 
 CLI::App* add_simplify(CLI::App& app, SimplifyOptions& options) {
-  CLI::App* const command =
-      app.add_subcommand("simplify", "keep fewer samples, where the surface needs them, with all attributes");
+  CLI::App* const command = app.add_subcommand("simplify", "keep fewer samples, with all attributes");
+  command
+      ->add_option("--method", options.method,
+                   "quadrics: where the surface needs them; uniform: evenly spaced, each as it was")
+      ->capture_default_str();
   command->add_option("--count", options.count, "samples to keep");
   command->add_option("--ratio", options.ratio, "or the part of them to keep, up to 1");
-  command->add_option("--error", options.error, "or how far off the surface, as a fraction of the diagonal");
-  command->add_option("--neighbors", options.neighbors, "of a sample's neighbourhood, 4 to 32")
-      ->capture_default_str();
+  command->add_option("--error", options.error,
+                      "or how far off the surface, as a fraction of the diagonal (quadrics)");
+  command->add_option("--neighbors", options.neighbors,
+                      "of a sample's neighbourhood, 4 to 32 (quadrics; 10 where not given)");
   return command;
 }
 

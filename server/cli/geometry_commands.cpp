@@ -7,6 +7,7 @@
 #include "engine/normals/rest_surface.h"
 #include "engine/simplification/attributes.h"
 #include "engine/simplification/simplification.h"
+#include "engine/simplification/subsample.h"
 #include "engine/smoothing/smoothing_hierarchy.h"
 #include "engine/smoothing/umbrella.h"
 #include "engine/smoothing/v_cycle.h"
@@ -58,6 +59,28 @@ Result<SimplifyTarget> target_of(const Cloud& cloud, const SimplifyOptions& opti
   return SimplifyTarget(KeepWithin{.error = static_cast<float>(*options.error * diagonal)});
 }
 
+constexpr std::uint32_t kNeighbors = 10;
+
+Result<Cloud> contracted(const Cloud& cloud, const SimplifyOptions& options, const SimplifyTarget& target) {
+  const auto rest = rest_surface(cloud, options.neighbors.value_or(kNeighbors), ExecutionContext{});
+  if (!rest) return rest.error();
+  const auto result = simplify(cloud.position, rest.value().normal, rest.value().graph, {.target = target});
+  if (!result) return result.error();
+  return simplified_cloud(result.value(), cloud);
+}
+
+// Normals tell the sheets of thin parts apart where the cloud has them.
+Result<Cloud> chosen_evenly(const Cloud& cloud, const SimplifyOptions& options) {
+  if (options.error) return wrong("an error bound is for --method quadrics", "error");
+  if (options.neighbors) return wrong("neighbourhoods are for --method quadrics", "neighbors");
+  SubsampleParams params;
+  if (options.count) params.target = KeepCount{.count = *options.count};
+  if (options.ratio) params.target = KeepRatio{.ratio = *options.ratio};
+  const auto kept = subsample(cloud.position, cloud.normal, params);
+  if (!kept) return kept.error();
+  return chosen_cloud(cloud, kept.value());
+}
+
 }  // namespace
 
 Result<Cloud> smoothed(const Cloud& cloud, const SmoothOptions& options, std::string& report) {
@@ -77,17 +100,17 @@ Result<Cloud> smoothed(const Cloud& cloud, const SmoothOptions& options, std::st
 }
 
 Result<Cloud> simplified(const Cloud& cloud, const SimplifyOptions& options, std::string& report) {
+  if (options.method != "quadrics" && options.method != "uniform")
+    return wrong("quadrics or uniform", "method");
   const auto target = target_of(cloud, options);
   if (!target) return target.error();
-  const auto rest = rest_surface(cloud, options.neighbors, ExecutionContext{});
-  if (!rest) return rest.error();
-  const auto result =
-      simplify(cloud.position, rest.value().normal, rest.value().graph, {.target = target.value()});
+  auto result = options.method == "uniform" ? chosen_evenly(cloud, options)
+                                            : contracted(cloud, options, target.value());
   if (!result) return result.error();
   std::ostringstream line;
-  line << cloud.size() << " samples to " << result.value().kept.size();
+  line << cloud.size() << " samples to " << result.value().size();
   report = line.str();
-  return simplified_cloud(result.value(), cloud);
+  return result;
 }
 
 }  // namespace pointwright::server

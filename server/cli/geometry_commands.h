@@ -23,12 +23,17 @@ Result<Cloud> smoothed(const Cloud& cloud, const SmoothOptions& options, std::st
 
 /// Exactly one of count, ratio and error.
 struct SimplifyOptions {
+  /// quadrics: by pair contraction (§3.2), where the surface needs samples; uniform: evenly spaced input
+  /// samples
+  std::string method = "quadrics";
   std::optional<std::size_t> count;  ///< samples to keep
   std::optional<double> ratio;       ///< of the samples, in (0, 1]
-  std::optional<double> error;  ///< of the diagonal: what a sample may be off the planes that it stands for
-  std::uint32_t neighbors = 10;
+  /// Of the diagonal: what a sample may be off the planes that it stands for; quadrics only.
+  std::optional<double> error;
+  std::optional<std::uint32_t> neighbors;  ///< 10 where not given; quadrics only
 };
-/// The cloud simplified by pair contraction under error quadrics (§3.2), with all its attributes.
+/// The cloud with fewer samples and all its attributes. By quadrics samples move and attributes are blended;
+/// what the uniform method keeps is as it was, to the bit.
 /// Errors: kInvalidArgument (fields of the options), those of the engine
 Result<Cloud> simplified(const Cloud& cloud, const SimplifyOptions& options, std::string& report);
 

@@ -205,6 +205,58 @@ TEST_CASE("simplify keeps what it is told to, with the attributes, and smooth ke
   }
 }
 
+TEST_CASE("simplify --method uniform keeps samples as they are, bit by bit and in their order") {
+  const TemporaryFolder folder;
+  Cloud cloud = wavy_sheet(20);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    cloud.color[i] = {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(i / 256), 9, 255};
+  }
+  const auto file = write_cloud(cloud, CloudFormat::kPly, {});
+  REQUIRE(file.ok());
+  write_file(folder / "sheet.ply", {reinterpret_cast<const char*>(file.value().data()), file.value().size()});
+  const auto read = [&](const std::string& name) {
+    const std::string bytes = read_text(folder / name);
+    auto result = read_cloud(std::as_bytes(std::span(bytes)), CloudFormat::kPly, {});
+    REQUIRE(result.ok());
+    return in_caller_order(std::move(result).value().cloud);
+  };
+  const auto simplify = [&](std::vector<std::string> options) {
+    std::vector<std::string> command{POINTWRIGHT_PATH,   "simplify", folder / "sheet.ply",
+                                     folder / "few.ply", "--method", "uniform"};
+    command.insert(command.end(), options.begin(), options.end());
+    return run(command);
+  };
+  CHECK(simplify({"--count", "100"}).out == "400 samples to 100\n");
+  const Cloud all = read("sheet.ply");
+  const Cloud few = read("few.ply");
+  REQUIRE(few.size() == 100);
+  CHECK_FALSE(few.has_normals());
+  std::size_t from = 0;
+  for (std::size_t i = 0; i < few.size(); ++i) {
+    while (from < all.size() && !(all.position[from] == few.position[i] && all.color[from] == few.color[i]))
+      ++from;
+    CHECK(from++ < all.size());
+  }
+  CHECK(simplify({"--ratio", "0.25"}).status == 0);
+  CHECK(read("few.ply").position == few.position);
+
+  const auto complaint = [&](std::vector<std::string> options) {
+    const Ended ended = simplify(std::move(options));
+    CHECK(ended.status == 2);
+    return ended.err;
+  };
+  CHECK(complaint({"--error", "0.01"}) == "pointwright: --error: an error bound is for --method quadrics\n");
+  CHECK(complaint({"--count", "9", "--neighbors", "8"}) ==
+        "pointwright: --neighbors: neighbourhoods are for --method quadrics\n");
+  CHECK(complaint({"--ratio", "1.5"}).find("--ratio: ") != std::string::npos);
+  CHECK(complaint({"--count", "0"}).find("--count: ") != std::string::npos);
+  CHECK_FALSE(complaint({}).empty());
+  const Ended other = run({POINTWRIGHT_PATH, "simplify", folder / "sheet.ply", folder / "few.ply", "--count",
+                           "9", "--method", "fast"});
+  CHECK(other.status == 2);
+  CHECK(other.err == "pointwright: --method: quadrics or uniform\n");
+}
+
 TEST_CASE("the tool's mistakes have exit statuses and sentences") {
   const TemporaryFolder folder;
   const std::string ply = sheet_file(folder, CloudFormat::kPly, "sheet.ply");

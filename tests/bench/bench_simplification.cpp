@@ -1,8 +1,9 @@
-// Simplification from raw points: ordering, neighbours and normals included.
+// Simplification from raw points: ordering, neighbours and normals included; subsampling from coherent order.
 #include <cstdlib>
 
 #include "engine/normals/estimation.h"
 #include "engine/simplification/simplification.h"
+#include "engine/simplification/subsample.h"
 #include "engine/spatial/coherent_order.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/synthetic_scan.h"
@@ -27,6 +28,13 @@ void bench_simplification(BenchReport& report) {
       const auto simplified = simplify(ordered.position, normal, graph,
                                        {.target = KeepCount{target.count}, .separate_sheets = false});
       if (!simplified || simplified.value().kept.size() != target.count) std::abort();
+    });
+  }
+  if (report.wants("subsample.2m.100k")) {
+    const Cloud scan = ordered_scan(kSamples);
+    report.time("subsample.2m.100k", "ms", static_cast<double>(kSamples), [&] {
+      const auto kept = subsample(scan.position, scan.normal, {.target = KeepCount{100'000}});
+      if (!kept || kept.value().size() != 100'000) std::abort();
     });
   }
 }

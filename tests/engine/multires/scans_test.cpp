@@ -1,19 +1,15 @@
-// Real scans, where POINTWRIGHT_DATA names a folder with them (they are not ours to pass on).
+// Decomposition of real scans (tests/support/scans.h).
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <span>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "engine/io/cloud_io.h"
 #include "engine/multires/hierarchy.h"
+#include "tests/support/scans.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -40,11 +36,6 @@ constexpr Scan kScans[] = {
     {"church.ply", 33'500, 116'000, 90'000,
      16.5}  // 2.6 million samples, photogrammetry, flats and thin parts
 };
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // The largest |p_{k+1} - (p_k + d_k n_k)| of any band; infinite where anything is not finite.
 double identity_error(const MultiresSurface& surface) {
@@ -77,22 +68,11 @@ double base_stretch(const MultiresSurface& surface, const NeighborGraph& graph) 
 }
 
 TEST_CASE("known scans are decomposed with no more failures than measured") {
-  const char* folder = std::getenv("POINTWRIGHT_DATA");
-  if (folder == nullptr) {
-    MESSAGE("POINTWRIGHT_DATA is not set: no scans to decompose");
-    return;
-  }
   for (const Scan& scan : kScans) {
     CAPTURE(scan.file);
-    const std::filesystem::path path = std::filesystem::path(folder) / scan.file;
-    if (!std::filesystem::exists(path)) {
-      MESSAGE("not there, left out: " << scan.file);
-      continue;
-    }
-    const std::string bytes = bytes_of(path);
-    const auto read = read_cloud(std::as_bytes(std::span(bytes)), CloudFormat::kPly, {});
-    REQUIRE(read.ok());
-    const Cloud& cloud = read.value().cloud;
+    const std::optional<Cloud> found = real_scan(scan.file);
+    if (!found) continue;
+    const Cloud& cloud = *found;
     const std::vector<float> scales{0.04F, 0.02F, 0.01F};
     const auto built = build_hierarchy(cloud, {.scales = scales}, {});
     REQUIRE(built.ok());

@@ -92,5 +92,31 @@ TEST_CASE("interleaved components keep apart") {
   }
 }
 
+TEST_CASE("chosen samples keep all columns, and the caller's order") {
+  const Surface surface = plane(10, 0.1, Sampling::kJittered);
+  Cloud cloud = to_cloud(surface);
+  cloud.color.resize(100);
+  std::vector<std::int32_t> label(100);
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    cloud.id[i] = (i * 37 + 11) % 100;
+    cloud.color[i] = {static_cast<std::uint8_t>(i), 1, 2, 200};
+    label[i] = static_cast<std::int32_t>(1'000 * i);
+  }
+  cloud.scalars.push_back({.name = "label", .values = label});
+  const std::vector<std::uint32_t> kept{0, 3, 4, 50, 51, 98};
+  const Cloud result = chosen_cloud(cloud, kept);
+  REQUIRE(validate(result).ok());
+  REQUIRE(result.size() == kept.size());
+  for (std::size_t m = 0; m < kept.size(); ++m) {
+    CHECK(result.position[m] == cloud.position[kept[m]]);
+    CHECK(result.normal[m] == cloud.normal[kept[m]]);
+    CHECK(result.color[m] == cloud.color[kept[m]]);
+    CHECK(std::get<std::vector<std::int32_t>>(result.scalars[0].values)[m] == label[kept[m]]);
+    for (std::size_t other = 0; other < kept.size(); ++other) {
+      CHECK((result.id[m] < result.id[other]) == (cloud.id[kept[m]] < cloud.id[kept[other]]));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace pointwright

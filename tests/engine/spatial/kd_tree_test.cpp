@@ -165,6 +165,40 @@ TEST_CASE("a radius search includes its border and says where the limit cut") {
   CHECK(found.size() == points.size());
 }
 
+// Seven copies of a box's corners, each farther out than the last. To a query in the middle the eight nearest
+// are equally far, and each is the corner of the tree's box around its octant, so that the distances to the
+// boxes are those of the points but for the rounding on the way down.
+Points nested_corners(const Vec3f& corner) {
+  std::vector<Vec3f> list;
+  for (int copy = 1; copy <= 7; ++copy) {
+    const Vec3f p = corner * static_cast<float>(copy);
+    for (unsigned octant = 0; octant < 8; ++octant) {
+      list.push_back({(octant & 1U) != 0 ? p.x() : -p.x(), (octant & 2U) != 0 ? p.y() : -p.y(),
+                      (octant & 4U) != 0 ? p.z() : -p.z()});
+    }
+  }
+  return from_list(list);
+}
+
+TEST_CASE("no tie is missed where the distance to a box is rounded beyond that of the point in its corner") {
+  std::vector<Neighbor> found;
+  const Points points = nested_corners({0x1.56686cp-1F, 0x1.d63456p-1F, 0x1.7a5b44p-1F});
+  const auto expected = brute_force(points, {0, 0, 0});
+  REQUIRE(expected[0].distance_sq == expected[7].distance_sq);
+  const KdTree tree(points);
+  for (std::size_t k = 1; k <= 8; ++k) {
+    tree.nearest({0, 0, 0}, k, found);
+    CHECK(same(found, expected, k));
+  }
+  // The same of a radius whose square is just what the eight are away.
+  const Points others = nested_corners({0x1.809b94p-1F, 0x1.bae07p-1F, 0x1.84951cp-1F});
+  const auto within = brute_force(others, {0, 0, 0});
+  constexpr float kRadius = 0x1.5fcd5ep+0F;
+  REQUIRE(kRadius * kRadius == within[7].distance_sq);
+  CHECK_FALSE(KdTree(others).within({0, 0, 0}, kRadius, 20, found));
+  CHECK(same(found, within, 8));
+}
+
 TEST_CASE("a tree of identical points works and is quick") {
   const auto start = std::chrono::steady_clock::now();
   const KdTree tree(identical(100'000, {3, 3, 3}));
