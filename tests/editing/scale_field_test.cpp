@@ -22,6 +22,40 @@ TEST_CASE("the quartic blend has the paper's values and slopes") {
   CHECK(blend_slope(Blend::kQuartic, 0.5F) == doctest::Approx(-1.5));
 }
 
+TEST_CASE("every blend falls from 1 to 0 with flat ends, and the kernels compute it with its slope") {
+  // Along x between two balls, t is the blend of the distance to the one-region.
+  const std::size_t n = 1001;
+  Points line(n);
+  for (std::size_t i = 0; i < n; ++i)
+    line.set(i, {static_cast<float>(i) / static_cast<float>(n - 1), 0.0F, 0.0F});
+  const RegionPair regions{.zero = Region(test::points_of({{0, 0, 0}}), {0.0F}),
+                           .one = Region(test::points_of({{1, 0, 0}}), {0.0F})};
+  for (const Blend blend : {Blend::kQuartic, Blend::kCubic, Blend::kQuintic, Blend::kCosine}) {
+    CAPTURE(static_cast<int>(blend));
+    CHECK(blend_value(blend, 0.0F) == 1.0F);
+    CHECK(std::abs(blend_value(blend, 1.0F)) < 1e-6F);
+    CHECK(std::abs(blend_slope(blend, 0.0F)) < 1e-6F);
+    CHECK(std::abs(blend_slope(blend, 1.0F)) < 1e-6F);
+    const ScaleField field = compute_scale_field(line, regions, blend);
+    double worst = 0.0;
+    double worst_slope = 0.0;
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+      const float x = 1.0F - line[i].x();
+      worst = std::max(worst, static_cast<double>(std::abs(field.t[i] - blend_value(blend, x))));
+      // t grows along x as beta falls with the distance to the one-region.
+      worst_slope =
+          std::max(worst_slope, static_cast<double>(std::abs(field.gradient[i].x() + blend_slope(blend, x))));
+      const double numeric = (static_cast<double>(blend_value(blend, x + 1e-3F)) -
+                              static_cast<double>(blend_value(blend, x - 1e-3F))) /
+                             2e-3;
+      CHECK(std::abs(numeric - static_cast<double>(blend_slope(blend, x))) < 2e-3);
+      CHECK(field.t[i] >= field.t[i - 1]);
+    }
+    CHECK(worst < 2e-6);
+    CHECK(worst_slope < 2e-5);
+  }
+}
+
 TEST_CASE("t is 0 on every zero-sample, 1 on every one-sample, and grows monotonously between") {
   const Level plane = test::plane_level(101);
   const Marks marks = test::marks_beside(plane.position, 0.3F);
