@@ -1,0 +1,121 @@
+#include "tests/support/surface_distance.h"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "tests/support/surfaces.h"
+
+namespace pointwright {
+namespace {
+
+using namespace test;
+
+// Points at this height over the middle of a plane of side x side samples.
+Points above(std::size_t side, double height) {
+  const Surface lifted = moved(plane(side, 0.01, Sampling::kRandom, 5), {0.0, 0.0, height});
+  return lifted.position;
+}
+
+TEST_CASE("distances are summed up as mean, root mean square and maximum") {
+  const DistanceSummary summary = summarized({3.0, 0.0, 4.0, 1.0});
+  CHECK(summary.mean == 2.0);
+  CHECK(summary.rms == std::sqrt(26.0 / 4.0));
+  CHECK(summary.max == 4.0);
+  CHECK(summarized({}).max == 0.0);
+}
+
+TEST_CASE("a known surface is asked as it is") {
+  const Surface surface = sphere(1'000, 1.5, Sampling::kRandom);
+  const auto distance = distances_to(surface.position, [](const Vec3d& p) { return 1.0 - p.norm(); });
+  for (const double d : distance) CHECK(d == doctest::Approx(0.5).epsilon(1e-6));
+}
+
+TEST_CASE("from a plane both measures are the height, on whatever side its normals are") {
+  const Surface surface = plane(60, 0.01, Sampling::kRandom);
+  const Points normal = scrambled_signs(surface.normal, 3);
+  for (const double height : {0.0, 0.003, -0.02}) {
+    const Points queries = above(40, height);
+    const double exact = std::abs(static_cast<double>(static_cast<float>(height)));
+    for (const double d : distances_to_planes(queries, surface.position, normal)) {
+      CHECK(std::abs(d - exact) < 1e-9);
+    }
+    for (const double d : distances_to_quadratic_fit(queries, surface.position)) {
+      CHECK(std::abs(d - exact) < 1e-9);
+    }
+  }
+}
+
+TEST_CASE("tangent planes of a sphere lie outside of it by half the squared distance to their samples") {
+  // n_j . (p - q_j) = -|p - q_j|^2 / 2 R for p and q_j on the sphere, so the blend is known.
+  const double radius = 2.0;
+  const Surface coarse = sphere(600, radius, Sampling::kRandom);
+  const Surface dense = sphere(2'001, radius, Sampling::kRandom, 9);
+  const auto found = distances_to_planes(dense.position, coarse.position, coarse.normal);
+  for (std::size_t i = 0; i < dense.size(); ++i) {
+    std::vector<double> squares;
+    for (std::size_t j = 0; j < coarse.size(); ++j) {
+      squares.push_back(static_cast<double>((dense.position[i] - coarse.position[j]).squaredNorm()));
+    }
+    std::sort(squares.begin(), squares.end());
+    double sum = 0.0;
+    double weights = 0.0;
+    for (std::size_t j = 0; j < 10; ++j) {
+      const double weight = std::pow(1.0 - squares[j] / squares[10], 4);
+      sum += weight * squares[j] / (2.0 * radius);
+      weights += weight;
+    }
+    REQUIRE(found[i] == doctest::Approx(sum / weights).epsilon(1e-4));
+  }
+}
+
+TEST_CASE("a quadratic fit is on the sphere to fourth order, and as far off it as the query is") {
+  const double radius = 1.0;
+  double error[2] = {};
+  for (const int finer : {0, 1}) {
+    const Surface dense = sphere(finer != 0 ? 16'000 : 4'000, radius, Sampling::kRegular);
+    for (const double offset : {0.0, 0.004, -0.004}) {
+      const Surface queries = sphere(3'001, radius + offset, Sampling::kRandom);
+      for (const double d : distances_to_quadratic_fit(queries.position, dense.position)) {
+        error[finer] = std::max(error[finer], std::abs(d - std::abs(offset)));
+      }
+    }
+  }
+  CHECK(error[0] < 2e-4);
+  CHECK(error[1] < error[0] / 8.0);  // to floats: 16 in exact numbers
+}
+
+TEST_CASE("few samples, samples in a line and in one place have distances") {
+  const Vec3f up{0.0F, 0.0F, 1.0F};
+  const Points query = identical(1, {0.5F, 0.0F, 2.0F});
+  CHECK(distances_to_planes(query, identical(1, {0.0F, 0.0F, 0.0F}), identical(1, up))[0] ==
+        doctest::Approx(2.0));
+  CHECK(distances_to_planes(query, identical(40, {0.0F, 0.0F, 0.0F}), identical(40, up))[0] ==
+        doctest::Approx(2.0));
+  CHECK(distances_to_planes(identical(1, {0.0F, 0.0F, 0.0F}), identical(3, {0.0F, 0.0F, 0.0F}),
+                            identical(3, up))[0] == 0.0);
+  CHECK(distances_to_quadratic_fit(query, identical(40, {0.5F, 0.0F, 0.0F}))[0] == doctest::Approx(2.0));
+  CHECK(distances_to_quadratic_fit(query, identical(1, {0.5F, 0.0F, 0.0F}))[0] == doctest::Approx(2.0));
+  const Points line = collinear(50, {0.5F, 0.0F, -1.0F}, {0.5F, 0.0F, 1.0F});
+  CHECK(std::isfinite(distances_to_quadratic_fit(query, line)[0]));
+  const Points triangle = from_list({{0.0F, 0.0F, 1.0F}, {1.0F, 0.0F, 1.0F}, {0.0F, 1.0F, 1.0F}});
+  CHECK(distances_to_quadratic_fit(query, triangle)[0] == doctest::Approx(1.0));
+  CHECK(distances_to_planes(Points(), triangle, identical(3, up)).empty());
+}
+
+TEST_CASE("distances do not depend on the number of threads") {
+  const Surface dense = torus(5'000, 1.0, 0.4, Sampling::kRandom);
+  const Surface coarse = torus(700, 1.0, 0.4, Sampling::kRandom, 2);
+  const auto planes = distances_to_planes(dense.position, coarse.position, coarse.normal);
+  const auto fits = distances_to_quadratic_fit(coarse.position, dense.position);
+  with_threads(1, [&] {
+    CHECK(distances_to_planes(dense.position, coarse.position, coarse.normal) == planes);
+    CHECK(distances_to_quadratic_fit(coarse.position, dense.position) == fits);
+  });
+}
+
+}  // namespace
+}  // namespace pointwright
