@@ -90,22 +90,23 @@ std::vector<double> distances_to(const Points& queries, const SurfaceDistance& d
 
 std::vector<double> distances_to_planes(const Points& queries, const Points& samples, const Points& normal) {
   POINTWRIGHT_CHECK(samples.size() == normal.size(), "every sample has a normal");
-  return over_neighbors(
-      queries, samples, kPlanes, [&](const Vec3d& p, const std::vector<Neighbor>& found, double reach_sq) {
-        const Vec3d side = normal[found.front().index].cast<double>();
-        double sum = 0.0;
-        double weights = 0.0;
-        for (const Neighbor& neighbor : found) {
-          const double weight = squared(squared(closeness(neighbor, reach_sq)));
-          const Vec3d n = normal[neighbor.index].cast<double>();
-          const double height = n.dot(p - samples[neighbor.index].cast<double>());
-          sum += n.dot(side) < 0.0 ? -weight * height : weight * height;
-          weights += weight;
-        }
-        // All on the rim: as many planes through as many equally far samples, the nearest of them by index.
-        if (weights == 0.0) return std::abs(side.dot(p - samples[found.front().index].cast<double>()));
-        return std::abs(sum / weights);
-      });
+  return over_neighbors(queries, samples, kPlanes,
+                        [&](const Vec3d& p, const std::vector<Neighbor>& found, double reach_sq) {
+                          const Vec3d side = normal[found.front().index].cast<double>();
+                          double sum = 0.0;
+                          double weights = 0.0;
+                          for (const Neighbor& neighbor : found) {
+                            const double weight = squared(squared(closeness(neighbor, reach_sq)));
+                            const Vec3d n = normal[neighbor.index].cast<double>();
+                            const double height = n.dot(p - samples[neighbor.index].cast<double>());
+                            sum += n.dot(side) < 0.0 ? -weight * height : weight * height;
+                            weights += weight;
+                          }
+                          // All on the rim: as many planes through as many equally far samples, the nearest of them by index.
+                          if (weights == 0.0)
+                            return std::abs(side.dot(p - samples[found.front().index].cast<double>()));
+                          return std::abs(sum / weights);
+                        });
 }
 
 std::vector<double> distances_to_quadratic_fit(const Points& queries, const Points& samples) {
