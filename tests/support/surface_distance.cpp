@@ -13,7 +13,6 @@
 namespace pointwright::test {
 namespace {
 
-constexpr std::size_t kPlanes = 10;
 constexpr std::size_t kFitted = 32;
 
 // Square of the radius at which weights vanish; the sample that stands there, if any, leaves `found`.
@@ -31,6 +30,19 @@ double squared(double x) {
 // 1 at the query, 0 at the reach; all alike where everything stands in one place.
 double closeness(const Neighbor& neighbor, double reach_sq) {
   return reach_sq > 0.0 ? std::max(0.0, 1.0 - static_cast<double>(neighbor.distance_sq) / reach_sq) : 1.0;
+}
+
+std::vector<Neighbor> nearest_samples(const Points& queries, const Points& samples) {
+  const KdTree tree(samples);
+  std::vector<Neighbor> result(queries.size());
+  parallel_for(queries.size(), [&](std::size_t begin, std::size_t end) {
+    std::vector<Neighbor> found;
+    for (std::size_t i = begin; i < end; ++i) {
+      tree.nearest(queries[i], 1, found);
+      result[i] = found.front();
+    }
+  });
+  return result;
 }
 
 // distance(query, its nearest samples) of every query.
@@ -88,25 +100,79 @@ std::vector<double> distances_to(const Points& queries, const SurfaceDistance& d
   return result;
 }
 
-std::vector<double> distances_to_planes(const Points& queries, const Points& samples, const Points& normal) {
-  POINTWRIGHT_CHECK(samples.size() == normal.size(), "every sample has a normal");
-  return over_neighbors(queries, samples, kPlanes,
-                        [&](const Vec3d& p, const std::vector<Neighbor>& found, double reach_sq) {
-                          const Vec3d side = normal[found.front().index].cast<double>();
-                          double sum = 0.0;
-                          double weights = 0.0;
-                          for (const Neighbor& neighbor : found) {
-                            const double weight = squared(squared(closeness(neighbor, reach_sq)));
-                            const Vec3d n = normal[neighbor.index].cast<double>();
-                            const double height = n.dot(p - samples[neighbor.index].cast<double>());
-                            sum += n.dot(side) < 0.0 ? -weight * height : weight * height;
-                            weights += weight;
-                          }
-                          // All on the rim: as many planes through as many equally far samples, the nearest of them by index.
-                          if (weights == 0.0)
-                            return std::abs(side.dot(p - samples[found.front().index].cast<double>()));
-                          return std::abs(sum / weights);
-                        });
+Discs discs_over(const Points& samples, const Points& originals, const Points& original_normal) {
+  POINTWRIGHT_CHECK(!samples.empty(), "there must be samples to measure from");
+  POINTWRIGHT_CHECK(originals.size() == original_normal.size(), "every original has a normal");
+  const std::vector<Neighbor> nearest = nearest_samples(originals, samples);
+  std::vector<Symmetric3d> spread(samples.size());
+  std::vector<double> farthest_sq(samples.size(), 0.0);
+  for (std::size_t i = 0; i < originals.size(); ++i) {
+    const std::size_t j = nearest[i].index;
+    const Vec3d n = original_normal[i].cast<double>();
+    farthest_sq[j] = std::max(farthest_sq[j], static_cast<double>(nearest[i].distance_sq));
+    // Lines have no side: their mean is the dominant eigenvector of sum n n', the least one of sum (1 - n n').
+    Symmetric3d& m = spread[j];
+    m.xx += 1.0 - n.x() * n.x();
+    m.yy += 1.0 - n.y() * n.y();
+    m.zz += 1.0 - n.z() * n.z();
+    m.xy -= n.x() * n.y();
+    m.xz -= n.x() * n.z();
+    m.yz -= n.y() * n.z();
+  }
+  Discs discs{Points(samples.size()), std::vector<double>(samples.size(), 0.0)};
+  for (std::size_t j = 0; j < samples.size(); ++j) {
+    Vec3d n;
+    smallest_eigenvector(spread[j], n);
+    discs.normal.set(j, n.cast<float>());
+    discs.radius[j] = 2.0 * std::sqrt(farthest_sq[j]);
+  }
+  return discs;
+}
+
+std::vector<double> distances_to_discs(const Points& originals, const Points& original_normal,
+                                       const Points& samples, const Discs& discs) {
+  const KdTree tree(originals);
+  std::vector<double> sum(originals.size(), 0.0);
+  std::vector<double> weights(originals.size(), 0.0);
+  // Searched for by many threads, added up by one, in the order of the discs.
+  constexpr std::size_t kDiscs = 4096;
+  std::vector<std::vector<Neighbor>> reached(std::min(kDiscs, samples.size()));
+  for (std::size_t first = 0; first < samples.size(); first += kDiscs) {
+    const std::size_t count = std::min(kDiscs, samples.size() - first);
+    parallel_for(
+        count,
+        [&](std::size_t begin, std::size_t end) {
+          for (std::size_t d = begin; d < end; ++d) {
+            const auto radius = static_cast<float>(discs.radius[first + d]);
+            reached[d].clear();
+            if (radius > 0.0F) tree.within(samples[first + d], radius, originals.size(), reached[d]);
+          }
+        },
+        16);
+    for (std::size_t d = 0; d < count; ++d) {
+      const std::size_t j = first + d;
+      const double radius_sq = squared(discs.radius[j]);
+      const Vec3d n = discs.normal[j].cast<double>();
+      for (const Neighbor& original : reached[d]) {
+        const double facing = n.dot(original_normal[original.index].cast<double>());
+        const double weight = squared(squared(closeness(original, radius_sq))) / radius_sq * squared(facing);
+        const Vec3d away = originals[original.index].cast<double>() - samples[j].cast<double>();
+        sum[original.index] += (facing < 0.0 ? -weight : weight) * n.dot(away);
+        weights[original.index] += weight;
+      }
+    }
+  }
+  const std::vector<Neighbor> nearest = nearest_samples(originals, samples);
+  std::vector<double> result(originals.size());
+  for (std::size_t i = 0; i < originals.size(); ++i) {
+    if (weights[i] > 0.0) {
+      result[i] = std::abs(sum[i] / weights[i]);
+    } else {
+      const Vec3d away = originals[i].cast<double>() - samples[nearest[i].index].cast<double>();
+      result[i] = std::abs(discs.normal[nearest[i].index].cast<double>().dot(away));
+    }
+  }
+  return result;
 }
 
 std::vector<double> distances_to_quadratic_fit(const Points& queries, const Points& samples) {

@@ -34,41 +34,75 @@ TEST_CASE("a known surface is asked as it is") {
   for (const double d : distance) CHECK(d == doctest::Approx(0.5).epsilon(1e-6));
 }
 
+// Distances of the originals to samples that stand for them.
+std::vector<double> disc_distances(const Surface& originals, const Points& samples) {
+  const Discs discs = discs_over(samples, originals.position, originals.normal);
+  return distances_to_discs(originals.position, originals.normal, samples, discs);
+}
+
 TEST_CASE("from a plane both measures are the height, on whatever side its normals are") {
-  const Surface surface = plane(60, 0.01, Sampling::kRandom);
-  const Points normal = scrambled_signs(surface.normal, 3);
+  Surface surface = plane(60, 0.01, Sampling::kRandom);
+  surface.normal = scrambled_signs(surface.normal, 3);
   for (const double height : {0.0, 0.003, -0.02}) {
-    const Points queries = above(40, height);
+    const Points others = above(20, height);
     const double exact = std::abs(static_cast<double>(static_cast<float>(height)));
-    for (const double d : distances_to_planes(queries, surface.position, normal)) {
+    for (const double d : disc_distances(surface, others)) CHECK(std::abs(d - exact) < 1e-9);
+    for (const double d : distances_to_quadratic_fit(others, surface.position)) {
       CHECK(std::abs(d - exact) < 1e-9);
     }
-    for (const double d : distances_to_quadratic_fit(queries, surface.position)) {
-      CHECK(std::abs(d - exact) < 1e-9);
-    }
+  }
+}
+
+TEST_CASE("samples of one face of a cube are not held against its others") {
+  const Surface surface = cube(60, 1.0);
+  const Surface sparse = cube(7, 1.0, 9);
+  const Discs own = discs_over(sparse.position, surface.position, surface.normal);
+  const Discs exact{sparse.normal, own.radius};
+  const auto distance = distances_to_discs(surface.position, surface.normal, sparse.position, exact);
+  CHECK(summarized(distance).mean < 1e-9);
+}
+
+TEST_CASE("an uneven set has no holes") {
+  // Dense on one half of a plane, sparse on the other, a step of the height between them.
+  const Surface surface = plane(100, 0.01, Sampling::kRandom);
+  std::vector<Vec3f> places;
+  for (std::size_t i = 0; i < surface.size(); ++i) {
+    if (surface.position[i].x() < 0.0F || i % 50 == 0) places.push_back(surface.position[i]);
+  }
+  const Points samples = from_list(places);
+  const Discs discs = discs_over(samples, surface.position, surface.normal);
+  for (std::size_t i = 0; i < surface.size(); ++i) {
+    const bool reached = [&] {
+      for (std::size_t j = 0; j < samples.size(); ++j) {
+        const auto away = static_cast<double>((surface.position[i] - samples[j]).norm());
+        if (away < discs.radius[j] || away == 0.0) return true;
+      }
+      return false;
+    }();
+    REQUIRE(reached);
   }
 }
 
 TEST_CASE("tangent planes of a sphere lie outside of it by half the squared distance to their samples") {
   // n_j . (p - q_j) = -|p - q_j|^2 / 2 R for p and q_j on the sphere, so the blend is known.
   const double radius = 2.0;
-  const Surface coarse = sphere(600, radius, Sampling::kRandom);
+  const Surface coarse = sphere(300, radius, Sampling::kRandom);
   const Surface dense = sphere(2'001, radius, Sampling::kRandom, 9);
-  const auto found = distances_to_planes(dense.position, coarse.position, coarse.normal);
+  const Discs discs{coarse.normal, discs_over(coarse.position, dense.position, dense.normal).radius};
+  const auto found = distances_to_discs(dense.position, dense.normal, coarse.position, discs);
   for (std::size_t i = 0; i < dense.size(); ++i) {
-    std::vector<double> squares;
-    for (std::size_t j = 0; j < coarse.size(); ++j) {
-      squares.push_back(static_cast<double>((dense.position[i] - coarse.position[j]).squaredNorm()));
-    }
-    std::sort(squares.begin(), squares.end());
     double sum = 0.0;
     double weights = 0.0;
-    for (std::size_t j = 0; j < 10; ++j) {
-      const double weight = std::pow(1.0 - squares[j] / squares[10], 4);
-      sum += weight * squares[j] / (2.0 * radius);
+    for (std::size_t j = 0; j < coarse.size(); ++j) {
+      const auto square = static_cast<double>((dense.position[i] - coarse.position[j]).squaredNorm());
+      const double reach = discs.radius[j] * discs.radius[j];
+      if (square >= reach) continue;
+      const double facing = 1.0 - square / (2.0 * radius * radius);
+      const double weight = std::pow(1.0 - square / reach, 4) / reach * facing * facing;
+      sum += weight * square / (2.0 * radius);
       weights += weight;
     }
-    REQUIRE(found[i] == doctest::Approx(sum / weights).epsilon(1e-4));
+    REQUIRE(found[i] == doctest::Approx(sum / weights).epsilon(1e-3));
   }
 }
 
@@ -91,28 +125,30 @@ TEST_CASE("a quadratic fit is on the sphere to fourth order, and as far off it a
 TEST_CASE("few samples, samples in a line and in one place have distances") {
   const Vec3f up{0.0F, 0.0F, 1.0F};
   const Points query = identical(1, {0.5F, 0.0F, 2.0F});
-  CHECK(distances_to_planes(query, identical(1, {0.0F, 0.0F, 0.0F}), identical(1, up))[0] ==
-        doctest::Approx(2.0));
-  CHECK(distances_to_planes(query, identical(40, {0.0F, 0.0F, 0.0F}), identical(40, up))[0] ==
-        doctest::Approx(2.0));
-  CHECK(distances_to_planes(identical(1, {0.0F, 0.0F, 0.0F}), identical(3, {0.0F, 0.0F, 0.0F}),
-                            identical(3, up))[0] == 0.0);
+  const Surface original{query, identical(1, up)};
+  for (const std::size_t copies : {1, 40}) {
+    CHECK(disc_distances(original, identical(copies, {0.0F, 0.0F, 0.0F}))[0] == doctest::Approx(2.0));
+    CHECK(disc_distances(original, identical(copies, query[0]))[0] == 0.0);
+  }
+  // A disc that only planes at a right angle reach.
+  const Discs upright{identical(1, {1.0F, 0.0F, 0.0F}), {5.0}};
+  CHECK(distances_to_discs(query, identical(1, up), identical(1, {0.0F, 0.0F, 0.0F}), upright)[0] == 0.5);
   CHECK(distances_to_quadratic_fit(query, identical(40, {0.5F, 0.0F, 0.0F}))[0] == doctest::Approx(2.0));
   CHECK(distances_to_quadratic_fit(query, identical(1, {0.5F, 0.0F, 0.0F}))[0] == doctest::Approx(2.0));
   const Points line = collinear(50, {0.5F, 0.0F, -1.0F}, {0.5F, 0.0F, 1.0F});
   CHECK(std::isfinite(distances_to_quadratic_fit(query, line)[0]));
   const Points triangle = from_list({{0.0F, 0.0F, 1.0F}, {1.0F, 0.0F, 1.0F}, {0.0F, 1.0F, 1.0F}});
   CHECK(distances_to_quadratic_fit(query, triangle)[0] == doctest::Approx(1.0));
-  CHECK(distances_to_planes(Points(), triangle, identical(3, up)).empty());
+  CHECK(disc_distances({}, triangle).empty());
 }
 
 TEST_CASE("distances do not depend on the number of threads") {
   const Surface dense = torus(5'000, 1.0, 0.4, Sampling::kRandom);
   const Surface coarse = torus(700, 1.0, 0.4, Sampling::kRandom, 2);
-  const auto planes = distances_to_planes(dense.position, coarse.position, coarse.normal);
+  const auto discs = disc_distances(dense, coarse.position);
   const auto fits = distances_to_quadratic_fit(coarse.position, dense.position);
   with_threads(1, [&] {
-    CHECK(distances_to_planes(dense.position, coarse.position, coarse.normal) == planes);
+    CHECK(disc_distances(dense, coarse.position) == discs);
     CHECK(distances_to_quadratic_fit(coarse.position, dense.position) == fits);
   });
 }

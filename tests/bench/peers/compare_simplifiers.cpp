@@ -71,7 +71,8 @@ test::DistanceSummary in_millionths(const std::vector<double>& distances, double
   return summary;
 }
 
-Simplified measured(const Simplifier& method, const Model& model, std::size_t count) {
+Simplified measured(const Simplifier& method, const Model& model, const test::Surface& original,
+                    std::size_t count) {
   const Run run = method.load(model);
   const double parameter = matched(method.control, run, model, count);
   Simplified result;
@@ -79,15 +80,15 @@ Simplified measured(const Simplifier& method, const Model& model, std::size_t co
   Points left;
   result.ms = median_ms(run, parameter, left);
   result.count = left.size();
-  // Alike for all: normals estimated from what is left.
-  const Points ordered = test::coherent(left);
-  Points normal;
-  estimate_normals(ordered, build_neighbor_graph(ordered, kNeighbors), {}, normal);
   const auto diagonal = static_cast<double>(bounds_of(model.samples).diagonal());
-  result.to_set = in_millionths(test::distances_to_planes(model.samples, ordered, normal), diagonal);
-  result.to_surface = in_millionths(model.distance ? test::distances_to(ordered, model.distance)
-                                                   : test::distances_to_quadratic_fit(ordered, model.samples),
-                                    diagonal);
+  result.to_set =
+      in_millionths(test::distances_to_discs(original.position, original.normal, left,
+                                             test::discs_over(left, original.position, original.normal)),
+                    diagonal);
+  result.to_surface =
+      in_millionths(model.distance ? test::distances_to(left, model.distance)
+                                   : test::distances_to_quadratic_fit(left, original.position),
+                    diagonal);
   return result;
 }
 
@@ -118,6 +119,9 @@ std::vector<Simplified> compare_simplifiers(std::span<const Library> libraries, 
               "simplified to surface");
   std::printf("  %-30s %8s %9s   %8s %8s %9s   %8s %8s %9s\n", "method", "samples", "ms", "mean", "rms",
               "max", "mean", "rms", "max");
+  test::Surface original{test::coherent(model.samples), {}};
+  estimate_normals(original.position, build_neighbor_graph(original.position, kNeighbors), {},
+                   original.normal);
   for (const Library& library : libraries) {
     for (const Simplifier& method : library.simplifiers) {
       if (method.wants_mesh && model.mesh.triangle.empty()) continue;
@@ -125,7 +129,7 @@ std::vector<Simplified> compare_simplifiers(std::span<const Library> libraries, 
         std::printf("  %-30s takes minutes on so many samples\n", method.name.c_str());
         continue;
       }
-      const Simplified row = measured(method, model, count);
+      const Simplified row = measured(method, model, original, count);
       std::printf("  %-30s %8zu %9.1f   %8.2f %8.2f %9.1f   %8.2f %8.2f %9.1f\n", row.method.c_str(),
                   row.count, row.ms, row.to_set.mean, row.to_set.rms, row.to_set.max, row.to_surface.mean,
                   row.to_surface.rms, row.to_surface.max);
