@@ -34,8 +34,6 @@ double first_guess(Control control, const Model& model, std::size_t count) {
       return static_cast<double>(bounds_of(model.samples).diagonal()) / std::sqrt(static_cast<double>(count));
     case Control::kCluster:
       return static_cast<double>(model.samples.size()) / static_cast<double>(count);
-    case Control::kVariation:
-      return 0.01;
     default:
       return static_cast<double>(count);
   }

@@ -30,10 +30,9 @@ struct NormalEstimator {
 
 /// What decides how many samples are left.
 enum class Control {
-  kCount,      ///< the count itself
-  kCell,       ///< the width of cells, here and below: the larger, the fewer; it is searched for
-  kCluster,    ///< the most samples in a cluster
-  kVariation,  ///< how much a cluster may bend
+  kCount,    ///< the count itself
+  kCell,     ///< the width of cells, here and below: the larger, the fewer; it is searched for
+  kCluster,  ///< the most samples in a cluster
 };
 
 struct Simplifier {

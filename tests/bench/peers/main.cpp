@@ -1,5 +1,6 @@
-// pointwright_bench_peers [--out FILE] [--threads N] [--scan FILE] [FILTER]: measures this engine and other
-// libraries beside each other.
+// pointwright_bench_peers [--out FILE] [--threads N] [--samples N | --scan FILE] [FILTER]: measures this
+// engine and other libraries beside each other.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -19,6 +20,7 @@ struct Options {
   std::string out = "build/bench-peers.json";
   std::string filter;
   std::string scan;
+  std::size_t samples = 0;  // of the models, instead of what is given below
   int threads = 2;
 };
 
@@ -32,6 +34,8 @@ std::optional<Options> parsed(int argc, char** argv) {
       options.threads = std::atoi(argv[++i]);
     } else if (std::strcmp(argv[i], "--scan") == 0 && has_value) {
       options.scan = argv[++i];
+    } else if (std::strcmp(argv[i], "--samples") == 0 && has_value) {
+      options.samples = static_cast<std::size_t>(std::max(0LL, std::atoll(argv[++i])));
     } else if (argv[i][0] == '-') {
       return std::nullopt;
     } else {
@@ -93,8 +97,9 @@ std::pair<double, double> stolen_time() {
   return {stolen, whole};
 }
 
-void compare(const Model& model, std::size_t count, std::span<const Library> all,
-             bench::BenchReport& report) {
+// To a twentieth.
+void compare(const Model& model, std::span<const Library> all, bench::BenchReport& report) {
+  const std::size_t count = std::max<std::size_t>(1, model.samples.size() / 20);
   check_promises(model.name, compare_simplifiers(all, model, count, report), report);
 }
 
@@ -106,19 +111,21 @@ int run(const Options& options) {
   std::printf("\n");
   const auto [stolen_before, whole_before] = stolen_time();
   if (options.scan.empty()) {
-    compare_searches(all, 500'000, report);
-    compare(scan_model(200'000, 0.0), 10'000, all, report);
-    compare(scan_model(200'000, 0.001), 10'000, all, report);
-    compare(steps_model(200'000), 10'000, all, report);
-    if (report.wants("simplify.scan.2000000.100000"))
-      compare(scan_model(2'000'000, 0.0), 100'000, all, report);
+    if (options.samples == 0) compare_searches(all, 500'000, report);
+    const std::size_t samples = options.samples > 0 ? options.samples : 200'000;
+    compare(scan_model(samples, 0.0), all, report);
+    compare(scan_model(samples, 0.001), all, report);
+    compare(steps_model(samples), all, report);
+    if (options.samples == 0 && report.wants("simplify.scan.2000000.100000")) {
+      compare(scan_model(2'000'000, 0.0), all, report);
+    }
   } else {
     const auto model = read_model(options.scan);
     if (!model) {
       std::fprintf(stderr, "%s cannot be read\n", options.scan.c_str());
       return 1;
     }
-    compare(*model, std::max<std::size_t>(1, model->samples.size() / 20), all, report);
+    compare(*model, all, report);
   }
   const auto [stolen, whole] = stolen_time();
   std::printf("\nOther machines took %.1f %% of the processors' time.\n",
@@ -134,8 +141,9 @@ int run(const Options& options) {
 int main(int argc, char** argv) {
   const auto options = pointwright::peers::parsed(argc, argv);
   if (!options) {
-    std::fprintf(stderr,
-                 "usage: pointwright_bench_peers [--out FILE] [--threads N] [--scan FILE] [FILTER]\n");
+    std::fprintf(
+        stderr,
+        "usage: pointwright_bench_peers [--out FILE] [--threads N] [--samples N | --scan FILE] [FILTER]\n");
     return 2;
   }
   int status = 0;

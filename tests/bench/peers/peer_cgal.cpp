@@ -85,16 +85,6 @@ std::function<void(double, Points&)> load_hierarchy(const Model& model) {
   };
 }
 
-// Clusters as large as they may be, split where the surface bends.
-std::function<void(double, Points&)> load_hierarchy_by_variation(const Model& model) {
-  return [points = points_of(model.samples)](double variation, Points& result) {
-    std::vector<Point> left = points;
-    const auto end =
-        CGAL::hierarchy_simplify_point_set(left, CGAL::parameters::size(1000).maximum_variation(variation));
-    store(left.begin(), end, result);
-  };
-}
-
 std::function<void(double, Points&)> load_grid(const Model& model) {
   return [points = points_of(model.samples)](double cell, Points& result) {
     std::vector<Point> left = points;
@@ -121,8 +111,6 @@ Library cgal_library() {
           .searches = {{"CGAL", load_search}},
           .estimators = {{"CGAL", load_normals}},
           .simplifiers = {{"CGAL hierarchy", Control::kCluster, false, kAnyCount, load_hierarchy},
-                          {"CGAL hierarchy, by variation", Control::kVariation, false, kAnyCount,
-                           load_hierarchy_by_variation},
                           {"CGAL WLOP", Control::kCount, false, 200'000, load_wlop},
                           {"CGAL grid", Control::kCell, false, kAnyCount, load_grid}}};
 }
