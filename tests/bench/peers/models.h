@@ -31,6 +31,7 @@ Model scan_model(std::size_t samples, double noise);
 
 /// Three square slabs, one upon the other: flats that meet in sharp edges, inward and outward. Samples are
 /// uniform by area, so none stands on an edge; nor does a vertex of the mesh, as in a mesh made from a scan.
+/// The mesh has at most 40,000 vertices.
 Model steps_model(std::size_t samples);
 
 /// Exact to rounding, for points within about 0.03 of the scan's surface.
