@@ -110,7 +110,7 @@ Discs discs_over(const Points& samples, const Points& originals, const Points& o
     const std::size_t j = nearest[i].index;
     const Vec3d n = original_normal[i].cast<double>();
     farthest_sq[j] = std::max(farthest_sq[j], static_cast<double>(nearest[i].distance_sq));
-    // Lines have no side: their mean is the dominant eigenvector of sum n n', the least one of sum (1 - n n').
+    // Lines have no side: their mean is the dominant eigenvector of sum n n', the least of sum (1 - n n').
     Symmetric3d& m = spread[j];
     m.xx += 1.0 - n.x() * n.x();
     m.yy += 1.0 - n.y() * n.y();

@@ -60,8 +60,8 @@ void check_promises(const std::string& model, std::span<const Simplified> result
   promises.at_most(1.0, "mesh", to_surface, "samples no farther from the surface than mesh quadrics'");
   promises.at_most(1.0, "mesh", to_set, "originals no farther from the set than from mesh quadrics'");
   if (has(model, "steps")) {
-    // Methods that keep a few of the originals are at distance 0 by construction, and so are vertices of a mesh
-    // that are never moved.
+    // Methods that keep some of the originals are at distance 0 by construction, and so are vertices of a
+    // mesh that are never moved.
     for (const char* moving : {"voxel", "WLOP"}) {
       promises.at_most(1.0, moving, to_surface,
                        "samples nearer to flats and edges than moved ones of any peer");
