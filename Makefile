@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build build-tests viewer sample demo serve test bench sanitize tidy format check-arm64 clean
+.PHONY: help build build-tests viewer sample demo serve test bench bench-peers sanitize tidy format check-arm64 clean
 
 release := build/release
 daemon := $(release)/server/pointwrightd
@@ -81,6 +81,12 @@ bench: ## measure; table on the terminal, numbers in build/bench.json
 	@mkdir -p build
 	@$(call compile,release,pointwright_bench)
 	@$(release)/tests/bench/pointwright_bench --out build/bench.json
+
+bench-peers: ## measure beside CGAL, PCL, Open3D and nanoflann (installs them); numbers in build/bench-peers.json
+	@.ci/setup build peers
+	@mkdir -p build
+	@$(call compile,peers,pointwright_bench_peers)
+	@build/peers/tests/bench/peers/pointwright_bench_peers --out build/bench-peers.json $(if $(SCAN),--scan $(SCAN))
 
 sanitize: ## C++ tests under AddressSanitizer, UndefinedBehaviorSanitizer and ThreadSanitizer
 	@.ci/setup build web

@@ -50,9 +50,10 @@ struct SimplifyParams {
   SimplifyTarget target = KeepRatio{0.5};
   ContractionOrder order = ContractionOrder::kBatched;
   /// Adds this times the squared distance of the pair to its cost, in [0, 10]. 0: pure quadrics, as in §3.2,
-  /// few samples on flats, where chance decides. 1e-5 spreads those evenly and changes nothing elsewhere;
-  /// 0.05 keeps the whole result even, as smoothing on it wants.
-  float length_weight = 1e-5F;
+  /// few samples on flats, where chance decides. 1e-3 spreads those evenly, so that one sample never comes to
+  /// stand for a whole flat, and changes a curved surface by a hundredth of its error; with 1e-5 edges keep
+  /// more of the samples. 0.05 keeps the whole result even, as smoothing on it wants.
+  float length_weight = 1e-3F;
   Placement placement = Placement::kOnSurface;
   /// Never contracts a pair with n_i . n_j < 0, which stand on two sheets of a thin part, and lets them span
   /// no plane together. Wants consistently oriented normals; with false their sides do not count.

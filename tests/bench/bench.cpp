@@ -32,9 +32,13 @@ void BenchReport::time(const std::string& name, const std::string& unit, double 
   add(name, unit, work_items, median * scale);
 }
 
+void BenchReport::record(const std::string& name, const std::string& unit, double work_items, double value) {
+  rows_.push_back({name, value, unit, static_cast<std::size_t>(work_items), thread_count()});
+}
+
 void BenchReport::add(const std::string& name, const std::string& unit, double work_items, double value) {
   if (!wants(name)) return;
-  rows_.push_back({name, value, unit, static_cast<std::size_t>(work_items), thread_count()});
+  record(name, unit, work_items, value);
   std::printf("%-32s %12.3f %-10s n = %zu, %d threads\n", name.c_str(), value, unit.c_str(), rows_.back().n,
               rows_.back().threads);
   std::fflush(stdout);

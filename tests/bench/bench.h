@@ -30,7 +30,10 @@ class BenchReport {
   void time(const std::string& name, const std::string& unit, double work_items,
             const std::function<void()>& work);
 
-  /// A figure that was measured elsewhere.
+  /// A figure that was measured elsewhere, into the notebook alone.
+  void record(const std::string& name, const std::string& unit, double work_items, double value);
+
+  /// The same, and on the terminal.
   void add(const std::string& name, const std::string& unit, double work_items, double value);
 
   [[nodiscard]] const std::vector<Row>& rows() const { return rows_; }

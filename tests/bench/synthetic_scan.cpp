@@ -25,11 +25,20 @@ class Random {
   std::uint64_t state_;
 };
 
+constexpr double kMinor = 0.4;
+
 }  // namespace
+
+Vec3d scan_surface(double u, double v) {
+  const double bump = 0.01 * std::sin(9 * u) * std::sin(7 * v) + 0.003 * std::sin(41 * u + 3 * v) +
+                      0.001 * std::sin(150 * u) * std::cos(90 * v);
+  const double minor = kMinor + bump;
+  const double ring = 1.0 + minor * std::cos(v);
+  return {ring * std::cos(u), ring * std::sin(u), minor * std::sin(v)};
+}
 
 Cloud synthetic_scan(std::size_t n, std::uint64_t seed) {
   constexpr double kTwoPi = 2.0 * std::numbers::pi;
-  constexpr double kMinor = 0.4;
   Cloud cloud;
   cloud.position.resize(n);
   cloud.id.resize(n);
@@ -39,11 +48,7 @@ Cloud synthetic_scan(std::size_t n, std::uint64_t seed) {
     const double u = kTwoPi * random.uniform();
     const double v = kTwoPi * random.uniform();
     if (random.uniform() * (1.0 + kMinor) > 1.0 + kMinor * std::cos(v)) continue;  // even by area
-    const double bump = 0.01 * std::sin(9 * u) * std::sin(7 * v) + 0.003 * std::sin(41 * u + 3 * v) +
-                        0.001 * std::sin(150 * u) * std::cos(90 * v);
-    const double minor = kMinor + bump;
-    const double ring = 1.0 + minor * std::cos(v);
-    cloud.position.set(i++, Vec3d(ring * std::cos(u), ring * std::sin(u), minor * std::sin(v)).cast<float>());
+    cloud.position.set(i++, scan_surface(u, v).cast<float>());
   }
   return cloud;
 }

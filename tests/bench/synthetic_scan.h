@@ -10,6 +10,9 @@
 
 namespace pointwright::bench {
 
+/// The surface of the synthetic scan over the torus' two angles, u around its axis.
+Vec3d scan_surface(double u, double v);
+
 /// N samples of a torus (radii 1 and 0.4) with bumps of three wavelengths, sampled evenly by area with random
 /// positions, in random order. The same bytes on every machine.
 /// Pre:  n <= 2^32 - 1

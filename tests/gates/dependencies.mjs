@@ -33,6 +33,7 @@ const fenced = [
     header: /^(thread|future|execution)$/,
     allowed: /^(engine\/core\/worker_threads|server\/|tests\/)/,
   },
+  { name: "a peer", header: /^(CGAL|pcl|open3d|omp\.h)/, allowed: /^tests\/bench\/peers\/peer_/ },
   { name: "doctest", header: /^doctest\//, allowed: /^tests\// },
 ];
 /** Which top folder may include which. */

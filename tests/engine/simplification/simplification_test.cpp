@@ -151,6 +151,19 @@ TEST_CASE("a cube keeps its edges; its flats grow sparse and cost nothing") {
   CHECK(result.record.steps.back().error < 0.2F * spacing);
 }
 
+TEST_CASE("no sample comes to stand for a whole flat") {
+  // Flats cost nothing: without a length term one sample takes thousands, and the rest of the face is bare.
+  const Surface surface = cube(80, 1.0);
+  const std::size_t mean = 20;
+  for (const ContractionOrder order : {ContractionOrder::kGreedy, ContractionOrder::kBatched}) {
+    const Simplification result =
+        simplified(surface, {.target = KeepCount{surface.size() / mean}, .order = order});
+    std::vector<std::size_t> stands_for(result.kept.size(), 0);
+    for (const std::uint32_t m : result.parent) ++stands_for[m];
+    CHECK(*std::max_element(stands_for.begin(), stands_for.end()) < 20 * mean);
+  }
+}
+
 TEST_CASE("on a sphere the error falls with the count as 1 / count") {
   // A cap of area 4 pi / M has a height of 1 / M to first order.
   const Surface surface = sphere(40'000, 1.0, Sampling::kRegular);
