@@ -5,6 +5,7 @@
 #include "engine/normals/estimation.h"
 #include "engine/normals/orientation.h"
 #include "engine/simplification/simplification.h"
+#include "engine/simplification/subsample.h"
 #include "engine/spatial/coherent_order.h"
 #include "tests/bench/peers/library.h"
 #include "tests/support/surfaces.h"
@@ -57,6 +58,21 @@ Simplifier quadrics(const std::string& name, const SimplifyParams& params, std::
           }};
 }
 
+Simplifier uniform_subset() {
+  return {.name = "ours, uniform subset",
+          .control = Control::kCount,
+          .most_samples = kAnyCount,
+          .load = [](const Model& model) -> std::function<void(double, Points&)> {
+            return [&model](double count, Points& result) {
+              const Points ordered = test::coherent(model.samples);
+              auto chosen = subsample(ordered, {}, {.target = KeepCount{static_cast<std::size_t>(count)}});
+              if (!chosen) std::abort();
+              result.resize(chosen.value().size());
+              for (std::size_t i = 0; i < result.size(); ++i) result.set(i, ordered[chosen.value()[i]]);
+            };
+          }};
+}
+
 Simplifier random_subset() {
   return {.name = "random subset",
           .control = Control::kCount,
@@ -86,7 +102,8 @@ Library our_library() {
       .simplifiers = {quadrics("ours", {}, kAnyCount),
                       quadrics("ours, greedy", {.order = ContractionOrder::kGreedy}, kAnyCount),
                       quadrics("ours, quadric minimum", {.placement = Placement::kQuadricMinimum}, kAnyCount),
-                      quadrics("ours, even", {.length_weight = 0.05F}, kAnyCount), random_subset()},
+                      quadrics("ours, even", {.length_weight = 0.05F}, kAnyCount), uniform_subset(),
+                      random_subset()},
   };
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/core/simd_dispatch.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -47,9 +48,7 @@ TEST_CASE("a pair costs the same bits whichever of its samples comes first, on a
   const auto finite = std::count_if(reference.begin(), reference.end(), [](float c) { return c < 1.0F; });
   CHECK(finite > 500);
   CHECK(finite < 4'000);
-  const SimdLevel level = simd_level();
-  for (const SimdLevel other : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-    set_simd_level(other);
+  on_every_instruction_set([&] {
     std::vector<float> cost(a.size());
     nodes.costs(rule, b.data(), a.data(), a.size(), cost.data());
     CHECK(cost == reference);
@@ -75,8 +74,7 @@ TEST_CASE("a pair costs the same bits whichever of its samples comes first, on a
       REQUIRE(cost[a[p]] == reference[p]);
       REQUIRE(partner[a[p]] == (reference[p] < 1.0F ? b[p] : kNoNode));
     }
-  }
-  set_simd_level(level);
+  });
 }
 
 TEST_CASE("rows of contracted nodes hold what both had, once each, and the nearest where that is too much") {
@@ -90,9 +88,7 @@ TEST_CASE("rows of contracted nodes hold what both had, once each, and the neare
   std::vector<std::uint32_t> mate(64, kNoNode);
   mate[4] = 5;
   const std::uint32_t live[] = {4, 20};
-  const SimdLevel level = simd_level();
-  for (const SimdLevel other : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-    set_simd_level(other);
+  on_every_instruction_set([&] {
     for (const std::uint32_t count : {4U, 16U}) {  // neighbours of each
       std::vector<ContractionRow> rows(64);
       std::vector<std::uint32_t> expected;
@@ -136,8 +132,7 @@ TEST_CASE("rows of contracted nodes hold what both had, once each, and the neare
       CHECK(rows[20].neighbor[0] == 39);
       CHECK(rows[20].neighbor[1] == 20);
     }
-  }
-  set_simd_level(level);
+  });
 }
 
 }  // namespace
