@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <string>
 
 #include "engine/multires/shape_operator.h"
 #include "engine/spatial/coherent_order.h"
@@ -163,15 +164,15 @@ TEST_CASE("the field of these tests has the gradient that it says") {
 }
 
 TEST_CASE("detail follows quarter turns and strong stretches of plane and sphere within 2 %") {
-  const Rotation bend{.axis = Vec3d(0.0, -1.0, 0.0), .angle_rad = kPi / 2.0};
-  const Rotation spin{.axis = Vec3d(0.0, 0.0, 1.0), .angle_rad = kPi / 2.0};
+  // About axes at the models' edges: the map stretches up to six times, and folds nowhere.
+  const Rotation bend{.point = Vec3d(0.0, 0.0, 1.0), .axis = Vec3d(0.0, -1.0, 0.0), .angle_rad = kPi / 2.0};
+  const Rotation spin{.point = Vec3d(0.0, 1.0, 0.0), .axis = Vec3d(0.0, 0.0, 1.0), .angle_rad = kPi / 2.0};
   const Translation stretch{.vector = Vec3d(1.0, 0.0, 0.8)};
   struct Case {
-    const char* name;
+    std::string name;
     Deformation deformation;
   };
   for (const Case& edit : {Case{"bend", bend}, Case{"spin", spin}, Case{"stretch", stretch}}) {
-    CAPTURE(edit.name);
     const Errors on_plane = errors_of(plane(), edit.deformation, 0, 0.9);
     const Errors on_sphere = errors_of(sphere(), edit.deformation, 0, 2.0);
     MESSAGE(edit.name << ": plane " << on_plane.relative << ", sphere " << on_sphere.relative
@@ -186,14 +187,14 @@ TEST_CASE("detail follows quarter turns and strong stretches of plane and sphere
 
 TEST_CASE("one step of half a turn flips no normal") {
   for (const Vec3d& axis : {Vec3d(0.0, 0.0, 1.0), Vec3d(1.0, 0.0, 0.0)}) {
-    const Rotation half{.axis = axis, .angle_rad = kPi};
+    const Rotation half{.point = Vec3d(0.0, 1.0, 0.0), .axis = axis, .angle_rad = kPi};
     const Errors on_plane = errors_of(plane(), half, 0, 0.9);
     const Errors on_sphere = errors_of(sphere(), half, 0, 2.0);
     MESSAGE("half a turn: plane " << on_plane.relative << ", sphere " << on_sphere.relative
                                   << " of the rms detail");
     CHECK(on_plane.flipped + on_sphere.flipped == 0);
-    CHECK(on_plane.relative < 0.1);
-    CHECK(on_sphere.relative < 0.1);
+    CHECK(on_plane.relative < 0.02);
+    CHECK(on_sphere.relative < 0.02);
   }
 }
 
