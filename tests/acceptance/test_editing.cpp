@@ -203,6 +203,38 @@ TEST_CASE("a frame rendered for a tool shows what the same edit would give") {
   CHECK(daemon.get(session).json()["history"]["edits"] == 0);
 }
 
+TEST_CASE("every kind of deformation goes in over HTTP and comes back in the history") {
+  Daemon daemon;
+  const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(40))).json()["id"]);
+  REQUIRE(daemon.ask("PUT", session + "/regions/zero", R"({"operations":[)" + kLeft + "]}").status == 200);
+  REQUIRE(daemon.ask("PUT", session + "/regions/one", R"({"operations":[)" + kRight + "]}").status == 200);
+  const std::vector<std::string> deformations = {
+      R"({"type":"along_normal","distance":0.1})",
+      R"({"type":"toward_point","target":[0.5,0.5,1.0],"amount":0.25})",
+      R"({"type":"scale","center":[0.5,0.5,0.0],"factors":[1.0,1.0,2.0]})",
+      R"({"type":"twist","axis":{"point":[0.0,0.5,0.0],"direction":[1.0,0.0,0.0]},"angle_deg":90.0,"length":1.0})",
+      R"({"type":"sequence","steps":[{"type":"translation","vector":[0.0,0.0,0.1]},{"type":"rotation","axis":{"point":[0.5,0.5,0.0],"direction":[0.0,1.0,0.0]},"angle_deg":10.0}]})"};
+  for (const std::string& deformation : deformations) {
+    CAPTURE(deformation);
+    const json edit = {
+        {"level", 0}, {"blend", "quintic"}, {"deformation", json::parse(deformation)}, {"gains", {0.5}}};
+    const Reply current = daemon.get(session);
+    const Reply reply = daemon.ask("POST", session + "/edits", edit.dump(),
+                                   "If-Match: " + current.headers.at("etag") + "\r\n");
+    REQUIRE(reply.status == 201);
+    CHECK(reply.json()["edit"]["deformation"] == json::parse(deformation));
+    CHECK(reply.json()["edit"]["gains"] == json({0.5}));
+    CHECK(reply.json()["moved_samples"] > 300);
+  }
+  const Reply current = daemon.get(session);
+  const Reply wrong =
+      daemon.ask("POST", session + "/edits",
+                 R"({"level":0,"deformation":{"type":"along_normal","distance":1},"gains":[1,1]})",
+                 "If-Match: " + current.headers.at("etag") + "\r\n");
+  CHECK(wrong.status == 422);
+  CHECK(wrong.json()["errors"][0]["pointer"] == "/gains");
+}
+
 TEST_CASE("edits without painting, on unknown sessions or with wrong values are refused with problems") {
   Daemon daemon;
   const std::string session = daemon.open_session(daemon.upload(file_of(wavy_sheet(20))).json()["id"]);

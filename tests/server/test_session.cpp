@@ -258,6 +258,52 @@ TEST_CASE("undo, redo and jumps bring every state back to the bit, stored or rep
   }
 }
 
+TEST_CASE("every kind of edit gives the same bits previewed, committed, after other previews, and replayed") {
+  const EditParams bent{.deformation = Twist{.axis = Vec3d(1, 0, 0), .angle_rad = 1.0, .length = 0.7}};
+  const EditParams wide{.deformation = Scaling{.center = Vec3d(0.5, 0.5, 0), .factors = Vec3d(1, 1.5, 2)}};
+  const EditParams raised{.deformation = NormalOffset{.distance = 0.1}};
+  const EditParams drawn{.level = 1, .deformation = TowardPoint{.target = Vec3d(2, 0, 1), .amount = 0.3}};
+  const EditParams smooth{.blend = Blend::kCosine, .deformation = Translation{}, .gains = {0.0F}};
+  const EditParams several{.deformation = Deformation({NormalOffset{.distance = -0.05},
+                                                       Rotation{.axis = Vec3d(0, 1, 0), .angle_rad = 0.3}})};
+  const std::vector<EditParams> edits = {bent, wide, raised, drawn, smooth, several, turn(0.5), lift(0.1, 1)};
+  Workshop workshop;
+  const auto dragged = workshop.painted();
+  const auto plain = workshop.painted(1);  // no room for states: all but the newest are replayed
+  std::vector<Level> states = {finest(*plain)};
+  std::uint64_t sequence = 0;
+  for (const EditParams& params : edits) {
+    // A drag that wanders over the other kinds before it comes to this one.
+    for (const EditParams& other : {edits[0], edits[4], turn(0.2), turn(0.9), params}) {
+      const auto rendered = dragged->render_preview({.edit = other, .sequence = ++sequence}, 0);
+      REQUIRE(rendered.ok());
+    }
+    commit(*dragged, params);
+    commit(*plain, params);
+    states.push_back(finest(*plain));
+    CHECK(finest(*dragged) == states.back());
+    CHECK(finest(*plain) != states[states.size() - 2]);
+  }
+  for (const std::size_t edit : {3U, 8U, 5U, 1U, 7U}) {
+    REQUIRE(plain->move_head(edit).ok());
+    CHECK(finest(*plain) == states[edit]);
+  }
+}
+
+TEST_CASE("a picture that is shown is never written over by the frames after it") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  std::vector<std::pair<Picture, Level>> shown;
+  for (std::uint64_t i = 1; i <= 12; ++i) {
+    REQUIRE(session->put_preview({.edit = turn(0.05 * static_cast<double>(i)), .sequence = i}).ok());
+    REQUIRE(comes_true([&] { return session->display().picture().sequence == i; }));
+    Picture picture = session->display().picture();
+    Level seen = picture.surface->finest();
+    if (i % 3 != 0) shown.emplace_back(std::move(picture), std::move(seen));  // the others are let go
+  }
+  for (const auto& [picture, seen] : shown) CHECK(picture.surface->finest() == seen);
+}
+
 TEST_CASE("an edit after undo drops what was undone") {
   Workshop workshop;
   const auto session = workshop.painted();
