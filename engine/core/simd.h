@@ -45,7 +45,6 @@ using Mask = I;
 namespace detail {
 typedef float UnalignedF __attribute__((vector_size(kWidth * 4), aligned(4), may_alias));
 typedef std::int32_t UnalignedI __attribute__((vector_size(kWidth * 4), aligned(4), may_alias));
-typedef std::int16_t UnalignedShort __attribute__((vector_size(kWidth * 2), aligned(2), may_alias));
 }  // namespace detail
 
 POINTWRIGHT_SIMD_INLINE F load(const float* p) {
@@ -57,20 +56,11 @@ POINTWRIGHT_SIMD_INLINE I load(const std::int32_t* p) {
 POINTWRIGHT_SIMD_INLINE I load(const std::uint32_t* p) {
   return *reinterpret_cast<const detail::UnalignedI*>(p);
 }
-/// kWidth short integers, each in a lane of its own.
-POINTWRIGHT_SIMD_INLINE I load(const std::int16_t* p) {
-  return __builtin_convertvector(*reinterpret_cast<const detail::UnalignedShort*>(p), I);
-}
 POINTWRIGHT_SIMD_INLINE void store(float* p, F v) {
   *reinterpret_cast<detail::UnalignedF*>(p) = v;
 }
 POINTWRIGHT_SIMD_INLINE void store(std::int32_t* p, I v) {
   *reinterpret_cast<detail::UnalignedI*>(p) = v;
-}
-
-/// Pre: every lane fits.
-POINTWRIGHT_SIMD_INLINE void store(std::int16_t* p, I v) {
-  *reinterpret_cast<detail::UnalignedShort*>(p) = __builtin_convertvector(v, detail::UnalignedShort);
 }
 
 POINTWRIGHT_SIMD_INLINE F splat(float v) {

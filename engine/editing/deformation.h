@@ -72,9 +72,10 @@ struct Deformation {
 
   Deformation() : steps{Translation{}} {}
   explicit Deformation(std::vector<ElementaryDeformation> all) : steps(std::move(all)) {}
-  template <typename One>
-  requires std::is_constructible_v<ElementaryDeformation, const One&> Deformation(const One& one)
-      : steps{one} {}  // NOLINT(google-explicit-constructor): one is a composition of one
+  template <typename One,
+            typename = std::enable_if_t<std::is_constructible_v<ElementaryDeformation, const One&>>>
+  // NOLINTNEXTLINE(google-explicit-constructor): one is a composition of one
+  Deformation(const One& one) : steps{one} {}
 
   friend bool operator==(const Deformation&, const Deformation&) = default;
 };

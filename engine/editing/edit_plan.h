@@ -12,12 +12,13 @@
 
 namespace pointwright {
 
-/// Made once the regions or the surface change, not per frame. Immutable; the surface, the graph and the field
-/// that it was made of must outlive it and stay as they were.
+/// Made once the regions or the surface change, not per frame. Immutable; the surface, the graph and the
+/// field that it was made of must outlive it and stay as they were.
 class EditPlan {
  public:
   /// Of `params`, the level, the kinds of deformation and whether there are gains count, not their amounts.
-  /// Cost:    O(N k) a level finer than params.level, parallel; 4 k + 16 bytes a sample that may bend, a level
+  /// Cost:    O(N k) for each level finer than params.level, parallel; there 4 k + 16 bytes a sample that may
+  ///          bend
   /// Cancels: between blocks; the plan is then incomplete and must be dropped
   EditPlan(const MultiresSurface& surface, const NeighborGraph& graph, const EditParams& params,
            const ScaleField& field, const ExecutionContext* context = nullptr);
@@ -30,8 +31,9 @@ class EditPlan {
   [[nodiscard]] bool rigid_only() const { return rigid_only_; }
   [[nodiscard]] std::size_t memory() const;
 
-  /// Blocks of kSimdBlock samples, ascending: all that may move; of these, those that may bend; and those that
-  /// move as one rigid body with all their samples (t = 1 without a gradient), where nothing else is asked for.
+  /// Blocks of kSimdBlock samples, ascending: all that may move; of these, those that may bend; and those
+  /// that move as one rigid body with all their samples (t = 1 without a gradient), where nothing else is
+  /// asked for.
   [[nodiscard]] const std::vector<std::uint32_t>& moving() const { return moving_; }
   [[nodiscard]] const std::vector<std::uint32_t>& bending() const { return bending_; }
   [[nodiscard]] const std::vector<std::uint32_t>& rigid() const { return rigid_; }

@@ -11,9 +11,9 @@
 
 namespace pointwright {
 
-/// Of a level at rest: per sample the weights by which its neighbours' offsets regress to the two tangents of
-/// the rest plane, and two tilts that put the rest normal back. Carrying a normal is then two weighted sums and
-/// a cross product: it follows turns, spins and shear, and has no sign to choose.
+/// Of a level at rest: per sample the weights by which its neighbours' offsets regress to the two tangents
+/// of the rest plane, and two tilts that put the rest normal back. Carrying a normal is then two weighted
+/// sums and a cross product: it follows turns, spins and shear, and has no sign to choose.
 class NormalStencil {
  public:
   /// Neighbours that count, the nearest ones of the graph.
@@ -41,8 +41,8 @@ class NormalStencil {
     const Points* position;
     Points* normal;  ///< written
   };
-  /// Normals of the samples of blocks()[begin] .. blocks()[end - 1]. A sample that stands where it stood, with
-  /// the normal of its base unchanged, keeps its own to the bit; where the neighbours span no plane, the
+  /// Normals of the samples of blocks()[begin] .. blocks()[end - 1]. A sample that stands where it stood,
+  /// with the normal of its base unchanged, keeps its own to the bit; where the neighbours span no plane, the
   /// smallest rotation that the base's normal has made stands in.
   /// Cost:        O(k) a sample, sequential: callers cut the blocks into ranges
   /// Determinism: bitwise equal for any instruction set

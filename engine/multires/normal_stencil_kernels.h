@@ -1,6 +1,7 @@
 #pragma once
-// Arguments of the kernels that carry normals along (engine/multires/normal_stencil.h). Blocks are those of the
-// cloud, of kSimdBlock samples; `blocks` lists the ones that have a stencil, whose entries follow each other.
+// Arguments of the kernels that carry normals along (engine/multires/normal_stencil.h). Blocks are those of
+// the cloud, of kSimdBlock samples; `blocks` lists the ones that have a stencil, whose entries follow each
+// other.
 
 #include <cstddef>
 #include <cstdint>

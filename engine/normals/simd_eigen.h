@@ -100,13 +100,13 @@ struct SmallestEigenvector {
 /// Of positive semi-definite matrices, Eq. (4): the dominant eigenvector of the adjugate, by repeated
 /// squaring.
 POINTWRIGHT_SIMD_INLINE SmallestEigenvector smallest_eigenvector(const Symmetric& matrix) {
-  using namespace eigen_detail;
-  const Symmetric m = normalized(matrix);
-  const Symmetric a = adjugate(m);
-  SmallestEigenvector result{.direction = dominant_column(dominant_power(normalized(a))),
-                             .degenerate = ~(trace(a) >= kCollinear)};
+  const Symmetric m = eigen_detail::normalized(matrix);
+  const Symmetric a = eigen_detail::adjugate(m);
+  SmallestEigenvector result{
+      .direction = eigen_detail::dominant_column(eigen_detail::dominant_power(eigen_detail::normalized(a))),
+      .degenerate = ~(eigen_detail::trace(a) >= eigen_detail::kCollinear)};
   if (!any(result.degenerate)) return result;
-  const Direction substitute = across(dominant_column(m));
+  const Direction substitute = eigen_detail::across(eigen_detail::dominant_column(m));
   Direction& v = result.direction;
   v = {select(result.degenerate, substitute.x, v.x), select(result.degenerate, substitute.y, v.y),
        select(result.degenerate, substitute.z, v.z)};

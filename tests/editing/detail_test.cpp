@@ -1,5 +1,5 @@
-// What becomes of detail when the base is bent, stretched and spun: two bands over a plane and a sphere, against
-// the same surfaces deformed exactly.
+// What becomes of detail when the base is bent, stretched and spun: two bands over a plane and a sphere,
+// against the same surfaces deformed exactly.
 #include <doctest/doctest.h>
 
 #include <cmath>
