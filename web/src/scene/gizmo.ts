@@ -1,10 +1,10 @@
 import { Object3D } from "three";
 import { TransformControls } from "three/examples/jsm/controls/TransformControls.js";
-import type { Quaternion } from "../edits/deformation";
+import type { Quaternion } from "../math/quaternion";
 import type { Vec3 } from "../math/vec3";
 import type { Viewport } from "./viewport";
 
-export type GizmoMode = "translate" | "rotate";
+export type GizmoMode = "translate" | "rotate" | "scale";
 export type Axis = "x" | "y" | "z";
 
 const AXIS_COLORS = { x: 0xe8665f, y: 0x7cc56a, z: 0x5b93f0, active: 0xf2c14e };
@@ -12,6 +12,7 @@ const AXIS_COLORS = { x: 0xe8665f, y: 0x7cc56a, z: 0x5b93f0, active: 0xf2c14e };
 export interface GizmoPose {
   position: Vec3;
   quaternion: Quaternion;
+  scale: Vec3;
 }
 
 /** The handles on the surface. Poses are in scene coordinates; what they mean is the transform tool's. */
@@ -57,14 +58,20 @@ export class Gizmo {
 
   get pose(): GizmoPose {
     const { x, y, z, w } = this.anchor_.quaternion;
-    return { position: this.anchor_.position.toArray(), quaternion: [x, y, z, w] };
+    return {
+      position: this.anchor_.position.toArray(),
+      quaternion: [x, y, z, w],
+      scale: this.anchor_.scale.toArray(),
+    };
   }
 
-  show(mode: GizmoMode, pose: GizmoPose): void {
+  /** `own`: the handles stand along the pose's own axes rather than the model's. */
+  show(mode: GizmoMode, pose: GizmoPose, own = false): void {
     this.controls_.setMode(mode);
-    this.controls_.setSpace("world");
+    this.controls_.setSpace(own ? "local" : "world");
     this.anchor_.position.set(...pose.position);
     this.anchor_.quaternion.set(...pose.quaternion);
+    this.anchor_.scale.set(...pose.scale);
     this.anchor_.updateMatrixWorld();
     this.controls_.attach(this.anchor_);
     this.viewport_.invalidateOverlay();
