@@ -84,7 +84,7 @@ export function createTransformPanel(
       onclick: () => editor.setPivotEditing(!shown.pivotEditing),
     },
     icon("pivot"),
-    "Drag the pivot",
+    "Drag pivot",
   );
   const axisButtons = (["x", "y", "z"] as const).map((axis) =>
     h(
@@ -92,7 +92,7 @@ export function createTransformPanel(
       {
         type: "button",
         class: `axis-button axis-${axis}`,
-        aria: { pressed: "false", label: `Only along ${axis.toUpperCase()}` },
+        aria: { pressed: "false", label: `Hold ${axis.toUpperCase()}` },
         onclick: () => editor.setAxis(shown.axis === axis ? null : axis),
       },
       axis.toUpperCase(),
@@ -126,8 +126,8 @@ export function createTransformPanel(
       button.setAttribute("aria-pressed", String(button.dataset["kind"] === kind));
     if (!kind) replaceChildren(fields);
     else {
-      const handles = kind === "normal" ? [] : [axes, pivotButton];
-      replaceChildren(fields, ...numbers[kind].elements, ...handles, options.main, ends);
+      const handles = kind === "normal" ? null : h("div", { class: "field-row" }, axes, pivotButton);
+      replaceChildren(fields, ...numbers[kind].elements, handles, options.main, ends);
     }
     fields.hidden = kind === null;
   };
