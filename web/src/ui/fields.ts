@@ -101,11 +101,12 @@ export interface VectorField {
   set(value: Vec3): void;
 }
 
-/** A component by as many decimals as give the largest one four digits: more would not fit, and say nothing. */
+/** A component by as many decimals as give the largest one three or four digits: more would not fit, and say nothing. */
 function componentText(value: number, vector: Vec3): string {
   if (!vector.every(Number.isFinite)) return roundForShow(value);
   const largest = Math.max(...vector.map(Math.abs));
-  const decimals = largest > 0 ? Math.min(20, Math.max(0, 3 - Math.floor(Math.log10(largest)))) : 0;
+  const exponent = largest > 0 ? Math.floor(Math.log10(largest)) : 0;
+  const decimals = Math.min(20, Math.max(0, (exponent < -1 ? 2 : 3) - exponent));
   const rounded = Number(value.toFixed(decimals));
   return String(rounded === 0 ? Number(value.toPrecision(2)) : rounded);
 }
