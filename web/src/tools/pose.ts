@@ -18,7 +18,7 @@ import {
   quaternionOf,
   turnFromZ,
 } from "../math/quaternion";
-import { add, subtract, type Vec3 } from "../math/vec3";
+import { add, normalise, subtract, type Vec3 } from "../math/vec3";
 import type { GizmoPose } from "../scene/gizmo";
 
 /** The pose of the handles, in model space, as a deformation of that kind shows it. */
@@ -48,7 +48,7 @@ export function poseOf(kind: TransformKind, state: TransformState): GizmoPose {
 
 function turned(deformation: Deformation | null): AxisAngle | undefined {
   if (deformation?.type !== "rotation" && deformation?.type !== "twist") return undefined;
-  return { direction: deformation.axis.direction, angleDeg: deformation.angle_deg };
+  return { direction: normalise(deformation.axis.direction), angleDeg: deformation.angle_deg };
 }
 
 /** Handles that are drawn through the middle would turn the surface inside out: they stop short of it. */
@@ -70,7 +70,7 @@ export function deformationOf(kind: TransformKind, state: TransformState, pose: 
       return scaling(pivot, pose.scale.map(factorOf) as unknown as Vec3);
     case "twist": {
       const about = multiply(pose.quaternion, inverse(turnFromZ(twist.direction)));
-      const known = turned(deformation) ?? { direction: twist.direction, angleDeg: 0 };
+      const known = turned(deformation) ?? { direction: normalise(twist.direction), angleDeg: 0 };
       return twisting(pivot, twist.direction, axisAngleOf(about, known).angleDeg, twist.length);
     }
     case "normal":
