@@ -108,7 +108,8 @@ function componentText(value: number, vector: Vec3): string {
   const exponent = largest > 0 ? Math.floor(Math.log10(largest)) : 0;
   const decimals = Math.min(20, Math.max(0, (exponent < -1 ? 2 : 3) - exponent));
   const rounded = Number(value.toFixed(decimals));
-  return String(rounded === 0 ? Number(value.toPrecision(2)) : rounded);
+  const counts = Math.abs(value) > 1e-5 * largest;
+  return String(rounded === 0 && counts ? Number(value.toPrecision(2)) : rounded);
 }
 
 export function vectorField(name: string, value: Vec3, options: NumberOptions = {}): VectorField {
