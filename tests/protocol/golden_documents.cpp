@@ -121,6 +121,27 @@ std::vector<EditRecord> edits() {
            .one_samples = 9500}};
 }
 
+/// Edits of the further kinds; edit-translation and edit-rotation are written by hand.
+JsonDocument edit_of(const Deformation& deformation, Blend blend = Blend::kQuartic,
+                     std::vector<float> gains = {}) {
+  return to_json(
+      EditParams{.level = 0, .blend = blend, .deformation = deformation, .gains = std::move(gains)});
+}
+
+Vec3d axis_point() {
+  return {0.0, 0.05, 0.0};
+}
+
+Twist twist() {
+  return {.point = axis_point(), .axis = Vec3d::UnitY(), .angle_rad = to_radians(90.0), .length = 0.25};
+}
+
+Deformation sequence() {
+  return Deformation(
+      {Translation{.vector = Vec3d(0.0, 0.02, 0.0)},
+       Rotation{.point = axis_point(), .axis = Vec3d::UnitY(), .angle_rad = to_radians(37.5)}});
+}
+
 Problem invalid() {
   return {.kind = ProblemKind::kInvalidValue,
           .detail = "/shape/radius: must be a number, but is null (and 1 more fault)",
@@ -166,6 +187,12 @@ std::vector<File> document_files() {
       {"session-list", session_list({building().summary, ready().summary})},
       {"painting", painting_document(RegionKind::kZero, 120000, shared_operations())},
       {"edit-list", edit_list(1, edits())},
+      {"edit-along-normal", edit_of(NormalOffset{.distance = -0.004}, Blend::kCubic, {1.5F})},
+      {"edit-scale", edit_of(Scaling{.center = axis_point(), .factors = Vec3d(1.5, 1.0, 1.5)})},
+      {"edit-sequence", edit_of(sequence(), Blend::kCosine)},
+      {"edit-toward-point",
+       edit_of(TowardPoint{.target = Vec3d(0.0, 0.125, 0.0), .amount = 0.25}, Blend::kQuintic)},
+      {"edit-twist", edit_of(twist())},
       {"problem-invalid", to_json(invalid())},
       {"problem-stale", to_json(stale())},
       {"problem-limit", to_json(too_large())},

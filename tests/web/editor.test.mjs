@@ -252,6 +252,51 @@ test("the whole loop works by the keyboard: shapes and a rotation by numbers", {
   await close();
 });
 
+test("a twist by numbers: preview, blend and detail, recorded edit", { timeout }, async () => {
+  const { page, session, edits, close } = await openEditor();
+  await paintCaps(session, page);
+  const before = await countPixels(page);
+  await page.locator("canvas.viewport-canvas").focus();
+  await page.keyboard.press("t");
+  const button = page.locator('[data-kind="twist"]');
+  assert.equal(await button.getAttribute("aria-pressed"), "true");
+  // From the middle of what stays to the middle of what moves, along the capsule.
+  assert.ok(Number(await page.getByLabel("Axis X").inputValue()) > 0.999);
+  const length = Number(await page.getByLabel("Over a length of").inputValue());
+  assert.ok(length > 1.7 && length < 2.2, `over ${length}`);
+  // About a line above the capsule, half a turn over the whole height lifts the right cap over it.
+  await page.keyboard.press("x");
+  await page.getByLabel("Pivot X").fill("-1");
+  await page.getByLabel("Pivot Y").fill("0.4");
+  await page.getByLabel("Pivot Z").fill("0");
+  await page.getByLabel("Over a length of").fill("2");
+  await page.getByLabel("Angle").fill("180");
+  await page.getByLabel("Blend").selectOption("cosine");
+  await page.waitForFunction(() => globalThis.pointwright.status.lastSequence > 0, null, { timeout: waitMs });
+  await waitForIdle(page, waitMs);
+  const during = await countPixels(page);
+  assert.ok(during.redY < before.redY - 0.1, "the cap has turned up over the axis");
+  assert.equal((await edits()).edits.length, 0, "a preview is not recorded");
+  await page.locator("summary", { hasText: "Detail" }).click();
+  await page.locator("details.sub input[type=range]").last().fill("0.5");
+  await waitForIdle(page, waitMs);
+  const revision = await page.evaluate(() => globalThis.pointwright.status.revision);
+  await page.getByRole("button", { name: "Apply", exact: true }).click();
+  await waitForRevision(page, revision + 1);
+  const [record] = (await edits()).edits;
+  assert.deepEqual(record.edit.deformation, {
+    type: "twist",
+    axis: { point: [-1, 0.4, 0], direction: [1, 0, 0] },
+    angle_deg: 180,
+    length: 2,
+  });
+  assert.equal(record.edit.blend, "cosine");
+  assert.deepEqual(record.edit.gains, [...session.levels.slice(2).map(() => 1), 0.5]);
+  assert.match(await page.locator(".history-entry").nth(1).textContent(), /Twisted 180°/);
+  assert.ok(Math.abs((await countPixels(page)).redY - during.redY) < 0.02, "what was previewed");
+  await close();
+});
+
 test("the export is the edited cloud", { timeout }, async () => {
   const { page, session, close } = await openEditor();
   await page.getByText("Export", { exact: true }).click();

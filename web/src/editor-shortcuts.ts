@@ -1,5 +1,5 @@
 import type { TransformEditor } from "./edits/transform";
-import type { ToolName } from "./event-map";
+import { type ToolName, TRANSFORM_KINDS } from "./event-map";
 import { VIEW_NAMES } from "./scene/camera-math";
 import type { Viewport } from "./scene/viewport";
 import type { Bus } from "./session-store";
@@ -19,7 +19,7 @@ const TURN = 0.12;
 /** Every key of the editor, as one table: what the sheet shows is what the keys do. */
 export function editorShortcuts(context: ShortcutContext): Shortcut[] {
   const { bus, viewport, editor, transformPanel, stepBrush } = context;
-  const transforming = (): boolean => ["move", "rotate"].includes(bus.invoke("tool.current"));
+  const transforming = (): boolean => TRANSFORM_KINDS.some((kind) => kind === bus.invoke("tool.current"));
   const tool = (name: ToolName, letter: string, label: string): Shortcut => ({
     group: "Tools",
     keys: letter.toUpperCase(),
@@ -58,7 +58,10 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     tool("one", "o", "Paint the one-region: moves"),
     tool("erase", "e", "Erase painting"),
     tool("move", "g", "Move the one-region"),
-    tool("rotate", "r", "Rotate the one-region"),
+    tool("rotate", "r", "Turn the one-region"),
+    tool("scale", "s", "Scale the one-region"),
+    tool("twist", "t", "Twist the one-region"),
+    tool("normal", "n", "Raise or carve along the normals"),
     { group: "Brush", keys: "[", label: "Smaller brush", matches: key("["), run: () => stepBrush(-1) },
     { group: "Brush", keys: "]", label: "Larger brush", matches: key("]"), run: () => stepBrush(1) },
     { group: "Brush", keys: "Alt Wheel", label: "Brush size" },

@@ -4,7 +4,9 @@ import { CommandQueue } from "./command-queue";
 import { editorShortcuts } from "./editor-shortcuts";
 import { HistoryEditor } from "./edits/history";
 import { RegionEditor } from "./edits/regions";
+import { inScene } from "./edits/residual";
 import { TransformEditor } from "./edits/transform";
+import { TRANSFORM_KINDS } from "./event-map";
 import { FrameSource } from "./frame-source";
 import { displayFromLink, type LinkState, viewHash } from "./link";
 import { hasAttribute } from "./protocol/frames";
@@ -60,12 +62,8 @@ export function createEditor(
 
   const regions = new RegionEditor(bus, client, queue, store);
   const history = new HistoryEditor(bus, client, queue, store);
-  const transform = new TransformEditor(bus, client, queue, store, (deformation) => {
-    viewport.setResidual(
-      deformation?.type === "rotation"
-        ? { ...deformation, axis: { ...deformation.axis, point: store.toScene(deformation.axis.point) } }
-        : deformation,
-    );
+  const transform = new TransformEditor(bus, client, queue, store, (residual) => {
+    viewport.setResidual(residual && inScene(residual, (point) => store.toScene(point)));
   });
   let loaded = false;
   const source = new FrameSource(bus, client, store, viewport, () => {
@@ -100,8 +98,7 @@ export function createEditor(
   const gizmo = new Gizmo(viewport);
   new ToolManager(bus, new OrbitTool(), [
     ...brushes,
-    new TransformTool("move", bus, viewport, gizmo, store, transform),
-    new TransformTool("rotate", bus, viewport, gizmo, store, transform),
+    ...TRANSFORM_KINDS.map((kind) => new TransformTool(kind, bus, viewport, gizmo, store, transform)),
   ]);
   stage.addEventListener(
     "wheel",

@@ -1,8 +1,11 @@
-import type { Deformation, History, Problem, SessionDocument } from "./api/types";
+import type { Blend, Deformation, History, Problem, SessionDocument } from "./api/types";
 import type { Vec3 } from "./math/vec3";
 import type { DisplaySettings } from "./scene/display";
 
-export type ToolName = "orbit" | "zero" | "one" | "erase" | "move" | "rotate";
+/** The tools that deform, in the order of the panel. */
+export const TRANSFORM_KINDS = ["move", "rotate", "scale", "twist", "normal"] as const;
+export type TransformKind = (typeof TRANSFORM_KINDS)[number];
+export type ToolName = "orbit" | "zero" | "one" | "erase" | TransformKind;
 
 export interface PreviewStatus {
   /** `exact`: the picture is the server's frame of the newest parameters. `preview`: the hand is ahead of it. */
@@ -22,9 +25,13 @@ export interface TransformState {
   pivot: Vec3;
   axis: "x" | "y" | "z" | null;
   pivotEditing: boolean;
-  /** The smooth base moves and carries its detail; else the samples themselves move. */
+  /** What a twist turns about, through the pivot, and the height over which it turns by the angle. */
+  twist: { direction: Vec3; length: number };
   /** The level that moves; finer ones ride along. */
   level: number;
+  blend: Blend;
+  /** What multiplies each band's detail in the one-region; those of bands below the level do not count. */
+  gains: readonly number[];
   /** Why no transform can be made now; null where it can. */
   obstacle: string | null;
 }

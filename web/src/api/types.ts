@@ -26,7 +26,11 @@ export type Shape = WithVectors<Schemas["Shape"]>;
 export type RegionOperation = Omit<WithVectors<Schemas["PaintOperation"]>, "steal"> & { steal?: boolean };
 
 export type Deformation = WithVectors<Schemas["Deformation"]>;
-export type EditBody = Omit<WithVectors<Schemas["Edit"]>, "blend"> & { blend?: Schemas["Edit"]["blend"] };
+export type Blend = Schemas["Blend"];
+export type EditBody = Omit<WithVectors<Schemas["Edit"]>, "blend" | "gains"> & {
+  blend?: Blend;
+  gains?: readonly number[];
+};
 export type EditRecord = Omit<WithVectors<Schemas["EditRecord"]>, "edit"> & { edit: EditBody };
 export type History = { head: number; edits: EditRecord[] };
 export type ServiceInfo = Schemas["Info"];

@@ -1,33 +1,13 @@
-import type { Deformation } from "../api/types";
-import { dot, isFiniteVec3, length, normalise, scale, type Vec3 } from "../math/vec3";
+import type { Deformation, EditBody } from "../api/types";
+import { isFiniteVec3, length, type Vec3 } from "../math/vec3";
 
-export type Quaternion = readonly [x: number, y: number, z: number, w: number];
+/** Limits of the server. */
+export const LEAST_FACTOR = 1e-3;
+export const GREATEST_FACTOR = 1e3;
+const GREATEST_ANGLE_DEG = 36_000;
+const GREATEST_LENGTH = 1e9;
 
-export interface AxisAngle {
-  direction: Vec3;
-  angleDeg: number;
-}
-
-/**
- * The axis and angle of a unit quaternion, continued from `previous`: of all the pairs that mean the same rotation, the one
- * about the same axis whose angle is nearest. So a gizmo that is turned on and on counts beyond half a turn.
- */
-export function axisAngleOf(quaternion: Quaternion, previous?: AxisAngle): AxisAngle {
-  const [x, y, z, w] = quaternion;
-  const sine = Math.hypot(x, y, z);
-  let direction: Vec3 = sine > 1e-9 ? [x / sine, y / sine, z / sine] : (previous?.direction ?? [0, 0, 1]);
-  let angleDeg = (2 * Math.atan2(sine, w) * 180) / Math.PI;
-  if (previous && Math.abs(dot(direction, previous.direction)) > 0.999) {
-    if (dot(direction, previous.direction) < 0) {
-      direction = scale(direction, -1);
-      angleDeg = -angleDeg;
-    }
-    angleDeg += 360 * Math.round((previous.angleDeg - angleDeg) / 360);
-  } else if (angleDeg > 180) {
-    angleDeg -= 360;
-  }
-  return { direction, angleDeg };
-}
+export const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] } as const satisfies Record<string, Vec3>;
 
 export function translation(vector: Vec3): Deformation {
   return { type: "translation", vector };
@@ -37,61 +17,112 @@ export function rotation(point: Vec3, direction: Vec3, angleDeg: number): Deform
   return { type: "rotation", axis: { point, direction }, angle_deg: angleDeg };
 }
 
+export function scaling(center: Vec3, factors: Vec3): Deformation {
+  return { type: "scale", center, factors };
+}
+
+/** `length`: the height along the axis over which the surface turns by the angle. */
+export function twisting(point: Vec3, direction: Vec3, angleDeg: number, length: number): Deformation {
+  return { type: "twist", axis: { point, direction }, angle_deg: angleDeg, length };
+}
+
+export function alongNormal(distance: number): Deformation {
+  return { type: "along_normal", distance };
+}
+
 /** Whether a deformation moves nothing. */
 export function isIdentity(deformation: Deformation): boolean {
-  return deformation.type === "translation" ? length(deformation.vector) === 0 : deformation.angle_deg === 0;
+  switch (deformation.type) {
+    case "translation":
+      return length(deformation.vector) === 0;
+    case "along_normal":
+      return deformation.distance === 0;
+    case "toward_point":
+      return deformation.amount === 0;
+    case "scale":
+      return deformation.factors.every((factor) => factor === 1);
+    case "sequence":
+      return deformation.steps.every(isIdentity);
+    default:
+      return deformation.angle_deg === 0;
+  }
+}
+
+/** The same deformation about another pivot; null where it has none. */
+export function withPivot(deformation: Deformation, pivot: Vec3): Deformation | null {
+  if (deformation.type === "scale") return { ...deformation, center: pivot };
+  if (deformation.type !== "rotation" && deformation.type !== "twist") return null;
+  return { ...deformation, axis: { ...deformation.axis, point: pivot } };
+}
+
+function axisFault(axis: { point: Vec3; direction: Vec3 }, angleDeg: number): string | null {
+  if (!isFiniteVec3(axis.point)) return "The pivot needs three finite numbers.";
+  if (!isFiniteVec3(axis.direction)) return "The axis needs three finite numbers.";
+  if (length(axis.direction) === 0) return "The axis needs a direction other than zero.";
+  if (!Number.isFinite(angleDeg)) return "The angle needs a finite number.";
+  return Math.abs(angleDeg) <= GREATEST_ANGLE_DEG ? null : "The angle is 100 turns at most.";
 }
 
 /** Why a deformation cannot be sent; null where it can. */
 export function deformationFault(deformation: Deformation): string | null {
-  if (deformation.type === "translation") {
-    return isFiniteVec3(deformation.vector) ? null : "The vector needs three finite numbers.";
+  switch (deformation.type) {
+    case "translation":
+      return isFiniteVec3(deformation.vector) ? null : "The vector needs three finite numbers.";
+    case "along_normal":
+      return Math.abs(deformation.distance) <= GREATEST_LENGTH ? null : "The distance needs a finite number.";
+    case "toward_point":
+      if (!isFiniteVec3(deformation.target)) return "The target needs three finite numbers.";
+      return deformation.amount >= -GREATEST_FACTOR && deformation.amount <= 1
+        ? null
+        : "The amount is 1 at most.";
+    case "scale":
+      if (!isFiniteVec3(deformation.center)) return "The pivot needs three finite numbers.";
+      return deformation.factors.every((factor) => factor >= LEAST_FACTOR && factor <= GREATEST_FACTOR)
+        ? null
+        : `Each factor lies between ${LEAST_FACTOR} and ${GREATEST_FACTOR}.`;
+    case "rotation":
+      return axisFault(deformation.axis, deformation.angle_deg);
+    case "twist": {
+      const fault = axisFault(deformation.axis, deformation.angle_deg);
+      if (fault) return fault;
+      const { length } = deformation;
+      return length >= 1 / GREATEST_LENGTH && length <= GREATEST_LENGTH ? null : "The length is above zero.";
+    }
+    case "sequence":
+      return deformation.steps.map(deformationFault).find((fault) => fault !== null) ?? null;
   }
-  if (!isFiniteVec3(deformation.axis.point)) return "The pivot needs three finite numbers.";
-  if (!isFiniteVec3(deformation.axis.direction)) return "The axis needs three finite numbers.";
-  if (length(deformation.axis.direction) === 0) return "The axis needs a direction other than zero.";
-  return Number.isFinite(deformation.angle_deg) ? null : "The angle needs a finite number.";
 }
 
-/**
- * What remains to be done to a surface that shows `shown`, so that it shows `wanted`: exact for the closed forms of one
- * kind and one axis, since both move a sample in proportion to its t. Null where the two do not compose.
- */
-export function residual(shown: Deformation | null, wanted: Deformation | null): Deformation | null {
-  if (!wanted || wanted.type === "translation") {
-    const to = wanted?.vector ?? [0, 0, 0];
-    if (!shown) return translation(to);
-    if (shown.type === "translation") {
-      return translation([to[0] - shown.vector[0], to[1] - shown.vector[1], to[2] - shown.vector[2]]);
-    }
-    return wanted ? null : rotation(shown.axis.point, shown.axis.direction, -shown.angle_deg);
-  }
-  if (!shown) return wanted;
-  if (shown.type !== "rotation") return null;
-  const from = normalise(shown.axis.direction);
-  const axis = normalise(wanted.axis.direction);
-  const offset: Vec3 = [
-    wanted.axis.point[0] - shown.axis.point[0],
-    wanted.axis.point[1] - shown.axis.point[1],
-    wanted.axis.point[2] - shown.axis.point[2],
-  ];
-  const along = dot(offset, axis);
-  const apart = Math.sqrt(Math.max(0, dot(offset, offset) - along * along));
-  const cosine = dot(from, axis);
-  if (Math.abs(cosine) < 1 - 1e-9 || apart > 1e-9 * (1 + length(offset))) return null;
-  return rotation(
-    wanted.axis.point,
-    wanted.axis.direction,
-    wanted.angle_deg - Math.sign(cosine) * shown.angle_deg,
-  );
-}
+const list = (values: readonly number[]): string => values.map(formatNumber).join(", ");
+const factorsText = (values: readonly number[]): string =>
+  `${values.every((value) => value === values[0]) ? formatNumber(values[0] ?? 1) : list(values)}×`;
 
 /** A deformation in words, for the history and the badge. */
 export function describeDeformation(deformation: Deformation): string {
-  if (deformation.type === "translation") {
-    return `Move ${deformation.vector.map((value) => formatNumber(value)).join(", ")}`;
+  switch (deformation.type) {
+    case "translation":
+      return `Moved ${list(deformation.vector)}`;
+    case "along_normal":
+      return `${deformation.distance < 0 ? "Carved" : "Raised"} ${formatNumber(Math.abs(deformation.distance))}`;
+    case "toward_point":
+      return `Drawn ${formatNumber(100 * deformation.amount)} % toward ${list(deformation.target)}`;
+    case "rotation":
+      return `Turned ${formatNumber(deformation.angle_deg)}° about ${list(deformation.axis.direction)}`;
+    case "scale":
+      return `Scaled ${factorsText(deformation.factors)}`;
+    case "twist":
+      return `Twisted ${formatNumber(deformation.angle_deg)}°`;
+    case "sequence":
+      return deformation.steps.map(describeDeformation).join(", then ");
   }
-  return `Rotate ${formatNumber(deformation.angle_deg)}° about ${deformation.axis.direction.map((v) => formatNumber(v)).join(", ")}`;
+}
+
+/** An edit in words: what moved, and what became of the detail. */
+export function describeEdit(edit: EditBody): string {
+  const moved = describeDeformation(edit.deformation);
+  if (!edit.gains) return moved;
+  const detail = factorsText(edit.gains);
+  return isIdentity(edit.deformation) ? `Detail ${detail}` : `${moved}, detail ${detail}`;
 }
 
 /** At most four significant digits. */

@@ -1,5 +1,5 @@
 import type { Deformation } from "../api/types";
-import { residual } from "./deformation";
+import { type Residual, residual } from "./residual";
 
 export interface PreviewTransport {
   put(deformation: Deformation, sequence: number): Promise<void>;
@@ -8,7 +8,7 @@ export interface PreviewTransport {
 
 export interface PreviewListener {
   /** What the picture must add to the server's last frame; null where nothing or nothing that composes. */
-  onResidual(deformation: Deformation | null): void;
+  onResidual(residual: Residual | null): void;
   /** The newest parameters' own frame is on the screen; it took so long since they were sent. */
   onExact(latencyMs: number): void;
   onAhead(): void;

@@ -28,3 +28,14 @@ export function levelName(level: { level: number; scale: number }, diagonal: num
   if (level.scale === 0 || diagonal === 0) return `Level ${level.level}`;
   return `Level ${level.level} (${Number(((100 * level.scale) / diagonal).toPrecision(2))} %)`;
 }
+
+/** A band of detail by the scales that it lies between: what the base of level k smooths away and the next one keeps. */
+export function bandName(levels: readonly { scale: number }[], band: number, diagonal: number): string {
+  const percent = (level: number): number => {
+    const scale = levels[level]?.scale ?? 0;
+    return diagonal > 0 ? Number(((100 * scale) / diagonal).toPrecision(2)) : 0;
+  };
+  const [coarse, fine] = [percent(band), percent(band + 1)];
+  if (coarse === 0) return `Band ${band}`;
+  return fine === 0 ? `Below ${coarse} %` : `${coarse} % to ${fine} %`;
+}

@@ -1,13 +1,14 @@
 import type { ApiClient } from "../api/client";
 import { problemOf } from "../api/problem";
-import type { Deformation, EditBody, SessionDocument } from "../api/types";
+import type { Blend, Deformation, EditBody, SessionDocument } from "../api/types";
 import type { CommandQueue } from "../command-queue";
 import type { TransformState } from "../event-map";
 import type { Vec3 } from "../math/vec3";
 import type { Bus, SessionStore } from "../session-store";
-import { deformationFault, describeDeformation, isIdentity } from "./deformation";
+import { AXES, deformationFault, describeEdit, isIdentity, translation, withPivot } from "./deformation";
 import { reportChangedMeanwhile, reportError } from "./errors";
 import { PreviewSender } from "./preview";
+import type { Residual } from "./residual";
 
 function obstacleOf(session: SessionDocument): string | null {
   if (session.state !== "ready") return "The session is still being prepared.";
@@ -30,7 +31,10 @@ export class TransformEditor {
   private pivot_: Vec3 = [0, 0, 0];
   private axis_: TransformState["axis"] = null;
   private pivotEditing_ = false;
+  private twist_: TransformState["twist"] = { direction: [0, 1, 0], length: 1 };
   private level_ = 0;
+  private blend_: Blend = "quartic";
+  private gains_: number[];
   private committing_: number | null = null;
 
   constructor(
@@ -38,12 +42,13 @@ export class TransformEditor {
     client: ApiClient,
     queue: CommandQueue,
     store: SessionStore,
-    onResidual: (d: Deformation | null) => void,
+    onResidual: (residual: Residual | null) => void,
   ) {
     this.bus_ = bus;
     this.client_ = client;
     this.queue_ = queue;
     this.store_ = store;
+    this.gains_ = store.document.levels.slice(1).map(() => 1);
     this.preview = new PreviewSender(
       {
         put: (deformation, sequence) => client.putPreview(store.id, this.body(deformation), sequence),
@@ -76,14 +81,26 @@ export class TransformEditor {
       pivot: this.pivot_,
       axis: this.axis_,
       pivotEditing: this.pivotEditing_,
+      twist: this.twist_,
       level: this.level_,
+      blend: this.blend_,
+      gains: this.gains_,
       obstacle: obstacleOf(this.store_.document),
     };
   }
 
   /** Whether something waits to be recorded or dropped. */
   get pending(): boolean {
-    return this.deformation_ !== null && !isIdentity(this.deformation_);
+    return this.deformation_ !== null && (!isIdentity(this.deformation_) || this.changesDetail);
+  }
+
+  /** The edit as it stands, in words; empty where nothing is pending. */
+  get description(): string {
+    return this.deformation_ && this.pending ? describeEdit(this.body(this.deformation_)) : "";
+  }
+
+  private get changesDetail(): boolean {
+    return this.gains_.some((gain, band) => band >= this.level_ && gain !== 1);
   }
 
   set(deformation: Deformation): void {
@@ -93,19 +110,29 @@ export class TransformEditor {
     this.tell();
   }
 
-  /** Where rotations turn about, in model space. */
+  /** What turns and twists turn about and what a scale leaves in place, in model space. */
   setPivot(pivot: Vec3): void {
     this.pivot_ = pivot;
     const deformation = this.deformation_;
-    if (deformation?.type === "rotation" && !isIdentity(deformation)) {
-      this.set({ ...deformation, axis: { ...deformation.axis, point: pivot } });
-    } else {
-      this.tell();
-    }
+    const moved = deformation && !isIdentity(deformation) ? withPivot(deformation, pivot) : null;
+    if (moved) this.set(moved);
+    else this.tell();
   }
 
+  /** Holds an axis; a twist turns about it. */
   setAxis(axis: TransformState["axis"]): void {
     this.axis_ = axis;
+    if (axis) this.setTwist({ ...this.twist_, direction: AXES[axis] });
+    else this.tell();
+  }
+
+  setTwist(twist: TransformState["twist"]): void {
+    this.twist_ = twist;
+    const deformation = this.deformation_;
+    if (deformation?.type === "twist") {
+      const axis = { ...deformation.axis, direction: twist.direction };
+      this.set({ ...deformation, axis, length: twist.length });
+    }
     this.tell();
   }
 
@@ -117,12 +144,31 @@ export class TransformEditor {
   /** Which level moves: the detail of the finer ones rides along; on the finest one the samples themselves move. */
   setLevel(level: number): void {
     this.level_ = level;
+    this.again();
+  }
+
+  /** How t falls from the one-region to the zero-region. */
+  setBlend(blend: Blend): void {
+    this.blend_ = blend;
+    this.again();
+  }
+
+  /** What multiplies the detail of a band in the one-region. */
+  setGain(band: number, gain: number): void {
+    if (this.state.obstacle || !(band in this.gains_)) return;
+    this.gains_ = this.gains_.map((known, k) => (k === band ? gain : known));
+    this.deformation_ ??= translation([0, 0, 0]);
+    this.again();
+  }
+
+  /** The same deformation under other conditions. */
+  private again(): void {
     if (this.deformation_) this.preview.want(this.deformation_);
     this.tell();
   }
 
   cancel(): void {
-    this.deformation_ = null;
+    this.clear();
     this.pivotEditing_ = false;
     this.tell();
     this.bus_.fire("preview.changed", { state: "none", latencyMs: 0, samplesPerSecond: 0 });
@@ -134,16 +180,17 @@ export class TransformEditor {
   /** Records the transform; afterwards nothing is pending, or, where the server refuses, it is pending still. */
   async commit(): Promise<void> {
     const deformation = this.deformation_;
-    if (!deformation || isIdentity(deformation)) return;
+    if (!deformation || !this.pending) return;
     await this.queue_.enqueue(async () => {
       await this.preview.idle();
       const revision = this.store_.document.revision;
       this.committing_ = revision;
       try {
-        await this.client_.commitEdit(this.store_.id, this.body(deformation), revision);
+        const edit = this.body(deformation);
+        await this.client_.commitEdit(this.store_.id, edit, revision);
         this.settle();
         this.store_.update(await this.client_.session(this.store_.id));
-        this.bus_.fire("toast", { kind: "success", title: describeDeformation(deformation) });
+        this.bus_.fire("toast", { kind: "success", title: describeEdit(edit) });
       } catch (error) {
         await this.failed(error);
       } finally {
@@ -160,15 +207,21 @@ export class TransformEditor {
     await reportChangedMeanwhile(this.bus_, this.client_, this.store_);
   }
 
-  private settle(): void {
+  private clear(): void {
     this.deformation_ = null;
+    this.gains_ = this.gains_.map(() => 1);
+  }
+
+  private settle(): void {
+    this.clear();
     this.preview.settle();
     this.bus_.fire("preview.changed", { state: "none", latencyMs: 0, samplesPerSecond: 0 });
     this.tell();
   }
 
   private body(deformation: Deformation): EditBody {
-    return { level: this.level_, deformation };
+    const edit: EditBody = { level: this.level_, blend: this.blend_, deformation };
+    return this.changesDetail ? { ...edit, gains: this.gains_ } : edit;
   }
 
   private tell(): void {

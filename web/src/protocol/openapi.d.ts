@@ -621,33 +621,85 @@ export interface components {
             samples: components["schemas"]["Count"];
             operations: components["schemas"]["PaintOperation"][];
         };
-        Deformation: components["schemas"]["Translation"] | components["schemas"]["Rotation"];
+        /** @description F(p, t), where t of a sample is 0 in the zero-region, 1 in the one-region and blends between them. Lengths and points are in model space. A number beyond its limit is refused. */
+        Deformation: components["schemas"]["ElementaryDeformation"] | components["schemas"]["DeformationSequence"];
+        ElementaryDeformation: components["schemas"]["Translation"] | components["schemas"]["AlongNormal"] | components["schemas"]["TowardPoint"] | components["schemas"]["Rotation"] | components["schemas"]["Scale"] | components["schemas"]["Twist"];
+        /** @description One after the other, all with the t of the sample at rest */
+        DeformationSequence: {
+            /** @constant */
+            type: "sequence";
+            /** @description along_normal only as the first */
+            steps: components["schemas"]["ElementaryDeformation"][];
+        };
+        /** @description p + t vector */
         Translation: {
             /** @constant */
             type: "translation";
+            /** @description At most 1e9 long */
             vector: components["schemas"]["Vector"];
         };
+        /** @description p + t distance n, with n the unit normal of the edited level at p; embosses or carves */
+        AlongNormal: {
+            /** @constant */
+            type: "along_normal";
+            /** @description In model units; negative: inwards */
+            distance: number;
+        };
+        /** @description p + t amount (target - p) */
+        TowardPoint: {
+            /** @constant */
+            type: "toward_point";
+            /** @description Within 1e9 of zero */
+            target: components["schemas"]["Vector"];
+            /** @description 1: all the way; negative: away from it */
+            amount: number;
+        };
+        Axis: {
+            /** @description On the axis; within 1e9 of zero */
+            point: components["schemas"]["Vector"];
+            /** @description Of any length but zero */
+            direction: components["schemas"]["Vector"];
+        };
+        /** @description Beyond a full turn it winds; at most 100 turns either way */
+        AngleInDegrees: number;
+        /** @description Turns p about the axis by t angle_deg */
         Rotation: {
             /** @constant */
             type: "rotation";
-            axis: {
-                point: components["schemas"]["Vector"];
-                /** @description Of any length but zero */
-                direction: components["schemas"]["Vector"];
-            };
-            /** @description Beyond a full turn it winds; at most 100 turns either way */
-            angle_deg: number;
+            axis: components["schemas"]["Axis"];
+            angle_deg: components["schemas"]["AngleInDegrees"];
         };
+        /** @description center + (1 + t (factors - 1)) (p - center), for each model axis */
+        Scale: {
+            /** @constant */
+            type: "scale";
+            /** @description What stays; within 1e9 of zero */
+            center: components["schemas"]["Vector"];
+            /** @description Of x, y and z; each between 0.001 and 1000 */
+            factors: number[];
+        };
+        /** @description Turns p about the axis by t angle_deg h / length, with h the height of p over the axis' point along its direction; the plane through that point stays */
+        Twist: {
+            /** @constant */
+            type: "twist";
+            axis: components["schemas"]["Axis"];
+            angle_deg: components["schemas"]["AngleInDegrees"];
+            /** @description In model units; the height over which the surface turns by the angle */
+            length: number;
+        };
+        /**
+         * @description How t falls with x, 0 at the one-region and 1 at the zero-region. quartic, the paper's: (x² - 1)²; cubic, the same both ways: (1 - x)² (1 + 2 x); quintic, without curvature at the ends: (1 - x)³ (1 + 3 x + 6 x²); cosine: (1 + cos πx) / 2
+         * @default quartic
+         * @enum {string}
+         */
+        Blend: "quartic" | "cubic" | "quintic" | "cosine";
         EditMembers: {
             /** @description The level that moves; the finest: no multiresolution */
             level: components["schemas"]["Count"];
-            /**
-             * @description Of t between the regions; quartic: (x²-1)²
-             * @default quartic
-             * @enum {string}
-             */
-            blend: "quartic";
+            blend?: components["schemas"]["Blend"];
             deformation: components["schemas"]["Deformation"];
+            /** @description What multiplies the detail of each band, the one between levels k and k + 1, where t is 1, and 1 + t (gain - 1) on the way there; one number for each entry of the session's decomposition, of which those below the edited level do not count. Absent: 1 everywhere. 0 smooths a band away, negative numbers turn its detail inside out. */
+            gains?: number[];
         };
         Edit: components["schemas"]["EditMembers"];
         Preview: components["schemas"]["EditMembers"] & {

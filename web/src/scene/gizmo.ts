@@ -1,17 +1,21 @@
-import { Object3D } from "three";
+import { Object3D, Vector3 } from "three";
 import { TransformControls } from "three/examples/jsm/controls/TransformControls.js";
-import type { Quaternion } from "../edits/deformation";
+import type { Quaternion } from "../math/quaternion";
 import type { Vec3 } from "../math/vec3";
 import type { Viewport } from "./viewport";
 
-export type GizmoMode = "translate" | "rotate";
+export type GizmoMode = "translate" | "rotate" | "scale";
 export type Axis = "x" | "y" | "z";
 
 const AXIS_COLORS = { x: 0xe8665f, y: 0x7cc56a, z: 0x5b93f0, active: 0xf2c14e };
 
+/** How far the middle handle is drawn to scale by e. */
+const PIXELS_PER_E = 150;
+
 export interface GizmoPose {
   position: Vec3;
   quaternion: Quaternion;
+  scale: Vec3;
 }
 
 /** The handles on the surface. Poses are in scene coordinates; what they mean is the transform tool's. */
@@ -23,6 +27,10 @@ export class Gizmo {
   private readonly controls_: TransformControls;
   private readonly anchor_ = new Object3D();
   private dragging_ = false;
+  private readonly listeners_ = new AbortController();
+  /** Where the pointer is, and where it and the anchor's size were when a drag began. */
+  private pointer_ = { x: 0, y: 0 };
+  private start_ = { x: 0, y: 0, scale: new Vector3(1, 1, 1) };
 
   constructor(viewport: Viewport) {
     this.viewport_ = viewport;
@@ -34,10 +42,21 @@ export class Gizmo {
     this.controls_.addEventListener("change", () => viewport.invalidateOverlay());
     this.controls_.addEventListener("dragging-changed", (event) => {
       this.dragging_ = event.value === true;
+      this.start_ = { ...this.pointer_, scale: this.anchor_.scale.clone() };
       viewport.rig.setEnabled(!this.dragging_);
       this.onDragging?.(this.dragging_);
     });
-    this.controls_.addEventListener("objectChange", () => this.onDrag?.(this.pose));
+    this.controls_.addEventListener("objectChange", () => {
+      this.scaleEvenly();
+      this.onDrag?.(this.pose);
+    });
+    const follow = ({ clientX: x, clientY: y }: PointerEvent): void => {
+      this.pointer_ = { x, y };
+    };
+    // Before the controls see them.
+    const options = { capture: true, signal: this.listeners_.signal };
+    viewport.canvas.ownerDocument.addEventListener("pointermove", follow, options);
+    viewport.canvas.ownerDocument.addEventListener("pointerdown", follow, options);
     viewport.overlay.add(this.anchor_, this.controls_.getHelper());
     this.hide();
   }
@@ -57,14 +76,20 @@ export class Gizmo {
 
   get pose(): GizmoPose {
     const { x, y, z, w } = this.anchor_.quaternion;
-    return { position: this.anchor_.position.toArray(), quaternion: [x, y, z, w] };
+    return {
+      position: this.anchor_.position.toArray(),
+      quaternion: [x, y, z, w],
+      scale: this.anchor_.scale.toArray(),
+    };
   }
 
-  show(mode: GizmoMode, pose: GizmoPose): void {
+  /** `own`: the handles stand along the pose's own axes rather than the model's. */
+  show(mode: GizmoMode, pose: GizmoPose, own = false): void {
     this.controls_.setMode(mode);
-    this.controls_.setSpace("world");
+    this.controls_.setSpace(own ? "local" : "world");
     this.anchor_.position.set(...pose.position);
     this.anchor_.quaternion.set(...pose.quaternion);
+    this.anchor_.scale.set(...pose.scale);
     this.anchor_.updateMatrixWorld();
     this.controls_.attach(this.anchor_);
     this.viewport_.invalidateOverlay();
@@ -83,7 +108,15 @@ export class Gizmo {
     this.viewport_.invalidateOverlay();
   }
 
+  /** The middle handle scales by how far it is drawn to the right or up: its own distance from itself means nothing. */
+  private scaleEvenly(): void {
+    if (this.controls_.mode !== "scale" || this.controls_.axis !== "XYZ") return;
+    const along = this.pointer_.x - this.start_.x - (this.pointer_.y - this.start_.y);
+    this.anchor_.scale.copy(this.start_.scale).multiplyScalar(Math.exp(along / PIXELS_PER_E));
+  }
+
   dispose(): void {
+    this.listeners_.abort();
     this.controls_.detach();
     this.controls_.dispose();
     this.viewport_.overlay.remove(this.anchor_, this.controls_.getHelper());

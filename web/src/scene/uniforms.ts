@@ -1,5 +1,5 @@
 import { type Texture, type Vector2, Vector3 } from "three";
-import type { Deformation } from "../api/types";
+import type { Residual } from "../edits/residual";
 import { normalise } from "../math/vec3";
 import { ONE_COLOR, ZERO_COLOR } from "./region-colors";
 
@@ -61,7 +61,8 @@ export function createUniforms(viewport: Vector2, textures: PassTextures): PassU
     residualKind: { value: 0 },
     residualVector: { value: new Vector3() },
     residualPoint: { value: new Vector3() },
-    residualAngle: { value: 0 },
+    residualFrom: { value: new Vector3() },
+    residualAmount: { value: 0 },
     mode: { value: 0 },
     tintRegions: { value: true },
     colormap: { value: null },
@@ -106,17 +107,43 @@ export function createUniforms(viewport: Vector2, textures: PassTextures): PassU
   return { splat, shade, segment, present };
 }
 
+/** As the vertex shader numbers them. */
+const RESIDUAL_KINDS: Record<Residual["kind"], number> = {
+  translation: 1,
+  rotation: 2,
+  scale: 3,
+  twist: 4,
+  along_normal: 5,
+};
+const RADIANS = Math.PI / 180;
+
 /** The deformation that the splats add to the server's last frame, in scene coordinates; false where nothing changed. */
-export function setResidual(splat: Uniforms, deformation: Deformation | null): boolean {
-  const kind = deformation ? (deformation.type === "translation" ? 1 : 2) : 0;
-  if (kind === 0 && splat["residualKind"]?.value === 0) return false;
-  setUniform(splat, "residualKind", kind);
-  if (deformation?.type === "translation") {
-    vectorUniform(splat, "residualVector").set(...deformation.vector);
-  } else if (deformation) {
-    vectorUniform(splat, "residualVector").set(...normalise(deformation.axis.direction));
-    vectorUniform(splat, "residualPoint").set(...deformation.axis.point);
-    setUniform(splat, "residualAngle", (deformation.angle_deg * Math.PI) / 180);
+export function setResidual(splat: Uniforms, residual: Residual | null): boolean {
+  if (!residual && splat["residualKind"]?.value === 0) return false;
+  setUniform(splat, "residualKind", residual ? RESIDUAL_KINDS[residual.kind] : 0);
+  const vector = vectorUniform(splat, "residualVector");
+  if (residual && "point" in residual) vectorUniform(splat, "residualPoint").set(...residual.point);
+  switch (residual?.kind) {
+    case "translation":
+      vector.set(...residual.vector);
+      break;
+    case "rotation":
+      vector.set(...normalise(residual.direction));
+      setUniform(splat, "residualAmount", residual.angleDeg * RADIANS);
+      break;
+    case "scale":
+      vector.set(...residual.to).subScalar(1);
+      vectorUniform(splat, "residualFrom")
+        .set(...residual.from)
+        .subScalar(1);
+      break;
+    case "twist":
+      vector.set(...normalise(residual.direction));
+      setUniform(splat, "residualAmount", residual.degPerUnit * RADIANS);
+      break;
+    case "along_normal":
+      setUniform(splat, "residualAmount", residual.distance);
+      break;
   }
   return true;
 }

@@ -1,5 +1,5 @@
 import { Scene, WebGLRenderer } from "three";
-import type { Deformation } from "../api/types";
+import type { Residual } from "../edits/residual";
 import type { Vec3 } from "../math/vec3";
 import { CameraRig } from "./camera-rig";
 import { DEFAULT_DISPLAY, type DisplaySettings } from "./display";
@@ -167,8 +167,8 @@ export class Viewport {
   }
 
   /** The deformation that the picture adds to the server's last frame, in scene coordinates. */
-  setResidual(deformation: Deformation | null): void {
-    if (setResidual(this.passes_.uniforms.splat, deformation)) this.invalidate();
+  setResidual(residual: Residual | null): void {
+    if (setResidual(this.passes_.uniforms.splat, residual)) this.invalidate();
   }
 
   setRing(ring: BrushRing | null): void {

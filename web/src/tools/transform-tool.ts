@@ -1,25 +1,24 @@
-import { type AxisAngle, axisAngleOf, rotation, translation } from "../edits/deformation";
 import type { TransformEditor } from "../edits/transform";
-import type { TransformState } from "../event-map";
-import { add, subtract, type Vec3 } from "../math/vec3";
-import type { Gizmo, GizmoPose } from "../scene/gizmo";
+import type { TransformKind, TransformState } from "../event-map";
+import { distance, normalise, subtract } from "../math/vec3";
+import type { Gizmo, GizmoMode, GizmoPose } from "../scene/gizmo";
 import type { Viewport } from "../scene/viewport";
 import type { Bus, SessionStore } from "../session-store";
+import { deformationOf, poseOf } from "./pose";
 import type { Tool } from "./tool";
 
-const IDENTITY = [0, 0, 0, 1] as const;
+/** What the handles of a kind do; none where numbers alone say it. */
+const MODES: Record<TransformKind, GizmoMode | null> = {
+  move: "translate",
+  rotate: "rotate",
+  scale: "scale",
+  twist: "rotate",
+  normal: null,
+};
 
-/** A unit quaternion of an axis and an angle. */
-function quaternionOf(axis: AxisAngle): [number, number, number, number] {
-  const half = (axis.angleDeg * Math.PI) / 360;
-  const length = Math.hypot(...axis.direction) || 1;
-  const sine = Math.sin(half) / length;
-  return [axis.direction[0] * sine, axis.direction[1] * sine, axis.direction[2] * sine, Math.cos(half)];
-}
-
-/** Moves or turns the one-region by handles. Leaving the tool records what is pending; Escape drops it. */
+/** Deforms with the one-region by handles. Leaving the tool records what is pending; Escape drops it. */
 export class TransformTool implements Tool {
-  readonly name: "move" | "rotate";
+  readonly name: TransformKind;
   private readonly bus_: Bus;
   private readonly viewport_: Viewport;
   private readonly gizmo_: Gizmo;
@@ -27,11 +26,10 @@ export class TransformTool implements Tool {
   private readonly editor_: TransformEditor;
   private listeners_: AbortController | null = null;
   private unlisten_: (() => void)[] = [];
-  private axisAngle_: AxisAngle | undefined;
   private active_ = false;
 
   constructor(
-    name: "move" | "rotate",
+    name: TransformKind,
     bus: Bus,
     viewport: Viewport,
     gizmo: Gizmo,
@@ -48,7 +46,6 @@ export class TransformTool implements Tool {
 
   activate(): void {
     this.active_ = true;
-    this.axisAngle_ = undefined;
     this.editor_.setAxis(null);
     this.centrePivot();
     this.gizmo_.onDrag = (pose) => this.dragged(pose);
@@ -71,60 +68,46 @@ export class TransformTool implements Tool {
     else this.editor_.cancel();
   }
 
-  /** Puts the pivot where the transform most likely turns: between the regions, or amid what moves. */
+  /** Puts the pivot where the transform most likely starts: between the regions, or amid what moves or stays. */
   private centrePivot(): void {
     if (this.editor_.state.obstacle || this.editor_.pending) return;
-    const centres = this.viewport_.regionCentres();
-    const centre = this.name === "rotate" ? (centres.boundary ?? centres.one) : centres.one;
+    const { zero, one, boundary } = this.viewport_.regionCentres();
+    if (this.name === "twist" && zero && one && distance(zero, one) > 0) {
+      // From the middle of what stays to the middle of what moves, which turns by the whole angle.
+      this.editor_.setTwist({ direction: normalise(subtract(one, zero)), length: distance(zero, one) });
+      this.editor_.setPivot(this.store_.toModel(zero));
+      return;
+    }
+    const centre = this.name === "rotate" ? (boundary ?? one) : one;
     if (centre) this.editor_.setPivot(this.store_.toModel(centre));
   }
 
   private dragged(pose: GizmoPose): void {
-    const { pivot, pivotEditing, deformation } = this.editor_.state;
-    const position = this.store_.toModel(pose.position);
-    if (pivotEditing) {
-      this.editor_.setPivot(position);
-    } else if (this.name === "move") {
-      this.editor_.set(translation(subtract(position, pivot)));
-    } else {
-      const previous: AxisAngle | undefined =
-        deformation?.type === "rotation"
-          ? { direction: deformation.axis.direction, angleDeg: deformation.angle_deg }
-          : undefined;
-      this.axisAngle_ = axisAngleOf(pose.quaternion, previous);
-      this.editor_.set(rotation(pivot, this.axisAngle_.direction, this.axisAngle_.angleDeg));
-    }
+    const { state } = this.editor_;
+    const inModel = { ...pose, position: this.store_.toModel(pose.position) };
+    if (state.pivotEditing) this.editor_.setPivot(inModel.position);
+    else this.editor_.set(deformationOf(this.name, state, inModel));
   }
 
   /** Takes the handles where typed numbers, the pivot or the server put them. */
   private follow(state: TransformState): void {
     if (!this.active_) return;
-    if (state.obstacle) {
+    const mode = MODES[this.name];
+    if (state.obstacle || !mode) {
       this.gizmo_.hide();
       return;
     }
-    this.gizmo_.constrain(state.pivotEditing ? null : state.axis);
+    // A twist has one ring, about its own axis.
+    const twists = this.name === "twist" && !state.pivotEditing;
+    this.gizmo_.constrain(state.pivotEditing ? null : twists ? "z" : state.axis);
     if (this.gizmo_.dragging) return;
-    const mode = this.name === "move" || state.pivotEditing ? "translate" : "rotate";
-    this.gizmo_.show(mode, this.poseOf(state));
-  }
-
-  private poseOf(state: TransformState): GizmoPose {
-    const { deformation } = state;
-    let position: Vec3 = state.pivot;
-    if (deformation?.type === "translation" && !state.pivotEditing)
-      position = add(position, deformation.vector);
-    const turned = deformation?.type === "rotation" && !state.pivotEditing;
-    return {
-      position: this.store_.toScene(position),
-      quaternion: turned
-        ? quaternionOf({ direction: deformation.axis.direction, angleDeg: deformation.angle_deg })
-        : IDENTITY,
-    };
+    const pose = poseOf(this.name, state);
+    const inScene = { ...pose, position: this.store_.toScene(pose.position) };
+    this.gizmo_.show(state.pivotEditing ? "translate" : mode, inScene, twists);
   }
 
   private readonly doubleClick = (event: MouseEvent): void => {
-    if (this.gizmo_.hovered) return;
+    if (this.gizmo_.hovered || !MODES[this.name]) return;
     const hit = this.viewport_.pick(event.clientX, event.clientY);
     if (hit) this.editor_.setPivot(this.store_.toModel(hit.position));
   };

@@ -6,7 +6,8 @@ export interface NumberField {
   element: HTMLElement;
   input: HTMLInputElement;
   value: number;
-  set(value: number): void;
+  /** `text`: how the number shows, where that is not by six digits. */
+  set(value: number, text?: string): void;
 }
 
 export interface NumberOptions {
@@ -57,11 +58,12 @@ export function numberField(label: string, value: number, options: NumberOptions
     get value() {
       return current;
     },
-    set(next: number) {
+    set(next: number, text = roundForShow(next)) {
       current = next;
+      input.title = text === String(next) ? "" : String(next);
       // The hand that types is not interrupted: "30." stays as it is while it means 30.
       const typing = document.activeElement === input && Number(input.value.replace(",", ".")) === next;
-      if (!typing) input.value = roundForShow(next);
+      if (!typing) input.value = text;
       input.setAttribute("aria-invalid", "false");
     },
   };
@@ -99,6 +101,17 @@ export interface VectorField {
   set(value: Vec3): void;
 }
 
+/** A component by as many decimals as give the largest one three or four digits: more would not fit, and say nothing. */
+function componentText(value: number, vector: Vec3): string {
+  if (!vector.every(Number.isFinite)) return roundForShow(value);
+  const largest = Math.max(...vector.map(Math.abs));
+  const exponent = largest > 0 ? Math.floor(Math.log10(largest)) : 0;
+  const decimals = Math.min(20, Math.max(0, (exponent < -1 ? 2 : 3) - exponent));
+  const rounded = Number(value.toFixed(decimals));
+  const counts = Math.abs(value) > 1e-5 * largest;
+  return String(rounded === 0 && counts ? Number(value.toPrecision(2)) : rounded);
+}
+
 export function vectorField(name: string, value: Vec3, options: NumberOptions = {}): VectorField {
   const make = (axis: string, index: 0 | 1 | 2): NumberField => numberField(axis, value[index], options);
   const fields = [make("X", 0), make("Y", 1), make("Z", 2)] as const;
@@ -119,9 +132,10 @@ export function vectorField(name: string, value: Vec3, options: NumberOptions = 
       return [fields[0].value, fields[1].value, fields[2].value];
     },
     set(next: Vec3) {
-      fields[0].set(next[0]);
-      fields[1].set(next[1]);
-      fields[2].set(next[2]);
+      for (const [axis, field] of fields.entries()) {
+        const value = next[axis as 0 | 1 | 2];
+        field.set(value, componentText(value, next));
+      }
     },
   };
 }

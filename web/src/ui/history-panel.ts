@@ -1,5 +1,5 @@
 import type { EditRecord, History } from "../api/types";
-import { describeDeformation } from "../edits/deformation";
+import { describeEdit } from "../edits/deformation";
 import type { Bus } from "../session-store";
 import { h, replaceChildren, setText } from "./dom";
 import { formatAge, formatCount } from "./format";
@@ -32,7 +32,7 @@ export function createHistoryPanel(bus: Bus): HTMLElement {
     `${formatCount(record.moved_samples)} samples · ${formatAge(record.created)}`;
   const show = (history: History): void => {
     const entries = history.edits.map((record) =>
-      entry(describeDeformation(record.edit.deformation), describe(record), record.index, history.head),
+      entry(describeEdit(record.edit), describe(record), record.index, history.head),
     );
     replaceChildren(list, entry("As loaded", "", 0, history.head), ...entries);
     setText(section.aside, history.edits.length === 0 ? "" : `${history.head} / ${history.edits.length}`);

@@ -20,7 +20,10 @@ const TOOLS: readonly (readonly ToolButton[])[] = [
   ],
   [
     { name: "move", icon: "move", label: "Move", key: "G" },
-    { name: "rotate", icon: "rotate", label: "Rotate", key: "R" },
+    { name: "rotate", icon: "rotate", label: "Turn", key: "R" },
+    { name: "scale", icon: "scale", label: "Scale", key: "S" },
+    { name: "twist", icon: "twist", label: "Twist", key: "T" },
+    { name: "normal", icon: "normal", label: "Along normal", key: "N" },
   ],
 ];
 

@@ -1,20 +1,45 @@
 import type { SessionDocument } from "../api/types";
-import { describeDeformation, rotation, translation } from "../edits/deformation";
-import { levelName } from "../edits/scales";
 import type { TransformEditor } from "../edits/transform";
-import type { ToolName, TransformState } from "../event-map";
+import { type ToolName, TRANSFORM_KINDS, type TransformKind, type TransformState } from "../event-map";
 import type { Bus } from "../session-store";
 import { append, h, replaceChildren, setText } from "./dom";
-import { numberField, selectField, vectorField } from "./fields";
+import { createEditOptions } from "./edit-options";
 import { icon } from "./icons";
 import { createSection } from "./section";
-
-const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] } as const;
+import { createKindFields } from "./transform-fields";
 
 export interface TransformPanel {
   element: HTMLElement;
   /** Puts the cursor into the field that a typed digit belongs to; false where there is none. */
   type(character: string): boolean;
+}
+
+const KINDS: Record<TransformKind, { label: string; title: string; hint: string }> = {
+  move: { label: "Move", title: "Move (G)", hint: "Drag a handle or type. X, Y, Z hold an axis." },
+  rotate: {
+    label: "Turn",
+    title: "Turn (R)",
+    hint: "Drag a ring or type. A double click on the surface sets the pivot.",
+  },
+  scale: {
+    label: "Scale",
+    title: "Scale (S)",
+    hint: "Drag a handle, the middle one for all axes, or type. The pivot stays.",
+  },
+  twist: {
+    label: "Twist",
+    title: "Twist (T)",
+    hint: "Drag the ring or type. The surface turns by the angle over the length along the axis.",
+  },
+  normal: {
+    label: "Normal",
+    title: "Along normal (N)",
+    hint: "The surface rises along its normals, or is carved where the distance is negative.",
+  },
+};
+
+function kindOf(tool: ToolName): TransformKind | null {
+  return TRANSFORM_KINDS.find((kind) => kind === tool) ?? null;
 }
 
 /** The transform in numbers: the same one that the handles make. */
@@ -25,22 +50,31 @@ export function createTransformPanel(
 ): TransformPanel {
   const section = createSection("Transform");
   const commit = (): void => void bus.invoke("edit.commit");
+  const numbers = createKindFields(editor, session.diagonal, commit);
+  const options = createEditOptions(session, editor);
   let tool: ToolName = "orbit";
   let shown: TransformState = editor.state;
 
-  const vector = vectorField("Move by", [0, 0, 0], {
-    onChange: () => editor.set(translation(vector.value)),
-    onEnter: commit,
-  });
-  const turn = (): void => editor.set(rotation(pivot.value, direction.value, angle.value));
-  const angle = numberField("Angle", 0, { unit: "°", onChange: turn, onEnter: commit });
-  const direction = vectorField("Axis", [0, 1, 0], { onChange: turn, onEnter: commit });
-  const pivot = vectorField("Pivot", [0, 0, 0], {
-    onChange: () => {
-      if (pivot.value.every(Number.isFinite)) editor.setPivot(pivot.value);
-    },
-    onEnter: commit,
-  });
+  const kindButtons = TRANSFORM_KINDS.map((kind) =>
+    h(
+      "button",
+      {
+        type: "button",
+        class: "kind-button",
+        title: KINDS[kind].title,
+        aria: { pressed: "false" },
+        data: { kind },
+        onclick: () => bus.invoke("tool.activate", kind),
+      },
+      icon(kind),
+      KINDS[kind].label,
+    ),
+  );
+  const kinds = h(
+    "div",
+    { class: "kinds", role: "group", aria: { label: "Kind of transform" } },
+    ...kindButtons,
+  );
   const pivotButton = h(
     "button",
     {
@@ -50,7 +84,7 @@ export function createTransformPanel(
       onclick: () => editor.setPivotEditing(!shown.pivotEditing),
     },
     icon("pivot"),
-    "Drag the pivot",
+    "Drag pivot",
   );
   const axisButtons = (["x", "y", "z"] as const).map((axis) =>
     h(
@@ -58,16 +92,17 @@ export function createTransformPanel(
       {
         type: "button",
         class: `axis-button axis-${axis}`,
-        aria: { pressed: "false", label: `Only along ${axis.toUpperCase()}` },
-        onclick: () => chooseAxis(axis),
+        aria: { pressed: "false", label: `Hold ${axis.toUpperCase()}` },
+        onclick: () => editor.setAxis(shown.axis === axis ? null : axis),
       },
       axis.toUpperCase(),
     ),
   );
-  const chooseAxis = (axis: "x" | "y" | "z"): void => {
-    editor.setAxis(shown.axis === axis ? null : axis);
-    if (tool === "rotate" && !editor.pending) direction.set(AXES[axis]);
-  };
+  const axes = h(
+    "div",
+    { class: "axis-buttons", role: "group", aria: { label: "Axis constraint" } },
+    ...axisButtons,
+  );
   const apply = h(
     "button",
     { type: "button", class: "button primary", onclick: commit },
@@ -79,84 +114,39 @@ export function createTransformPanel(
     { type: "button", class: "button", onclick: () => bus.invoke("edit.cancel") },
     "Cancel",
   );
-  const finest = session.levels.length - 1;
-  const level = selectField(
-    "Edited level",
-    session.levels.map((each) => [
-      String(each.level),
-      each.level === finest ? "Full surface, no detail carried" : levelName(each, session.diagonal),
-    ]),
-    String(shown.level),
-    (value) => editor.setLevel(Number(value)),
-  );
-  level.select.title = "The level that moves; everything finer than its scale is carried along as detail.";
+  const ends = h("div", { class: "button-row" }, apply, cancel);
   const summary = h("p", { class: "hint", aria: { live: "polite" } });
   const fields = h("div", { class: "transform-fields" });
-  const start = h(
-    "div",
-    { class: "button-row" },
-    h(
-      "button",
-      { type: "button", class: "button", onclick: () => bus.invoke("tool.activate", "move") },
-      icon("move"),
-      "Move",
-    ),
-    h(
-      "button",
-      { type: "button", class: "button", onclick: () => bus.invoke("tool.activate", "rotate") },
-      icon("rotate"),
-      "Rotate",
-    ),
-  );
-  append(section.body, [fields, summary]);
+  append(section.body, [kinds, fields, summary, options.detail]);
 
   const layOut = (): void => {
-    const axes = h(
-      "div",
-      { class: "axis-buttons", role: "group", aria: { label: "Axis constraint" } },
-      ...axisButtons,
-    );
-    const ends = h("div", { class: "button-row" }, apply, cancel);
-    if (tool === "move") replaceChildren(fields, vector.element, axes, pivotButton, level.element, ends);
-    else if (tool === "rotate")
-      replaceChildren(
-        fields,
-        angle.element,
-        direction.element,
-        axes,
-        pivot.element,
-        pivotButton,
-        level.element,
-        ends,
-      );
-    else replaceChildren(fields, start);
+    const kind = kindOf(tool);
+    options.detail.hidden = kind === null;
+    for (const button of kindButtons)
+      button.setAttribute("aria-pressed", String(button.dataset["kind"] === kind));
+    if (!kind) replaceChildren(fields);
+    else {
+      const handles = kind === "normal" ? null : h("div", { class: "field-row" }, axes, pivotButton);
+      replaceChildren(fields, ...numbers[kind].elements, handles, options.main, ends);
+    }
+    fields.hidden = kind === null;
   };
   const show = (state: TransformState): void => {
     shown = state;
-    const { deformation } = state;
-    if (deformation?.type === "translation") vector.set(deformation.vector);
-    if (deformation?.type === "rotation") {
-      angle.set(deformation.angle_deg);
-      direction.set(deformation.axis.direction);
+    const kind = kindOf(tool);
+    if (kind) {
+      numbers[kind].show(state);
+      for (const input of numbers[kind].inputs) input.disabled = state.obstacle !== null;
     }
-    if (!deformation) {
-      vector.set([0, 0, 0]);
-      angle.set(0);
-    }
-    pivot.set(state.pivot);
-    level.select.value = String(state.level);
+    options.show(state);
     const ready = state.obstacle === null && editor.pending;
     apply.disabled = !ready;
     cancel.disabled = !ready;
     pivotButton.setAttribute("aria-pressed", String(state.pivotEditing));
     for (const [index, button] of axisButtons.entries())
       button.setAttribute("aria-pressed", String(state.axis === "xyz"[index]));
-    for (const field of [...vector.fields, ...direction.fields, ...pivot.fields, angle])
-      field.input.disabled = state.obstacle !== null;
-    setText(
-      summary,
-      state.obstacle ?? (ready && deformation ? describeDeformation(deformation) : hintOf(tool)),
-    );
+    const hint = kind ? KINDS[kind].hint : "What lies between the regions follows smoothly.";
+    setText(summary, state.obstacle ?? (ready ? editor.description : hint));
     summary.classList.toggle("obstacle", state.obstacle !== null);
   };
   bus.on("transform.changed", show);
@@ -171,21 +161,13 @@ export function createTransformPanel(
   return {
     element: section.element,
     type(character) {
-      if (tool !== "move" && tool !== "rotate") return false;
-      const index = shown.axis ? "xyz".indexOf(shown.axis) : 0;
-      const field = tool === "rotate" ? angle : vector.fields[index as 0 | 1 | 2];
-      if (shown.obstacle) return false;
-      if (tool === "rotate" && shown.axis) direction.set(AXES[shown.axis]);
-      field.input.focus();
-      field.input.value = character;
-      field.input.dispatchEvent(new Event("input"));
+      const kind = kindOf(tool);
+      if (!kind || shown.obstacle) return false;
+      const { input } = numbers[kind].digits(shown);
+      input.focus();
+      input.value = character;
+      input.dispatchEvent(new Event("input"));
       return true;
     },
   };
-}
-
-function hintOf(tool: ToolName): string {
-  if (tool === "move") return "Drag a handle or type. X, Y, Z hold an axis.";
-  if (tool === "rotate") return "Drag a ring or type. A double click on the surface sets the pivot.";
-  return "What lies between the regions follows smoothly.";
 }

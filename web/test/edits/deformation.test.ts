@@ -1,95 +1,82 @@
 import { expect, test } from "vitest";
 import type { Deformation } from "../../src/api/types";
 import {
-  axisAngleOf,
+  alongNormal,
   deformationFault,
   describeDeformation,
+  describeEdit,
   isIdentity,
-  type Quaternion,
-  residual,
   rotation,
+  scaling,
   translation,
+  twisting,
+  withPivot,
 } from "../../src/edits/deformation";
-import type { Vec3 } from "../../src/math/vec3";
-import { deform } from "../mock/session";
 
-function quaternion(axis: Vec3, angleDeg: number): Quaternion {
-  const half = (angleDeg * Math.PI) / 360;
-  const s = Math.sin(half);
-  return [axis[0] * s, axis[1] * s, axis[2] * s, Math.cos(half)];
-}
-
-function expectVector(actual: Vec3, expected: Vec3, digits = 9): void {
-  actual.forEach((value, axis) => {
-    expect(value).toBeCloseTo(expected[axis] ?? Number.NaN, digits);
-  });
-}
-
-test("a quaternion's axis and angle are told back", () => {
-  for (const angle of [-170, -30, 0.5, 45, 179]) {
-    const { direction, angleDeg } = axisAngleOf(quaternion([0, 0.6, 0.8], angle));
-    const sign = Math.sign(angleDeg) * Math.sign(angle);
-    expect(angleDeg * sign).toBeCloseTo(angle, 6);
-    expectVector([direction[0] * sign, direction[1] * sign, direction[2] * sign], [0, 0.6, 0.8]);
-  }
-});
-
-test("a gizmo that turns on and on counts beyond half a turn, both ways", () => {
-  for (const step of [25, -25]) {
-    let known = axisAngleOf(quaternion([0, 1, 0], step));
-    const sense = known.direction[1] > 0 ? 1 : -1;
-    for (let angle = step; Math.abs(angle) <= 800; angle += step) {
-      known = axisAngleOf(quaternion([0, 1, 0], angle), known);
-      expect(known.angleDeg * sense).toBeCloseTo(angle, 6);
-    }
-  }
-});
-
-test("no rotation keeps the axis that was known", () => {
-  expect(axisAngleOf([0, 0, 0, 1], { direction: [1, 0, 0], angleDeg: 3 })).toEqual({
-    direction: [1, 0, 0],
-    angleDeg: 0,
-  });
-});
+const Y = [0, 1, 0] as const;
+const O = [0, 0, 0] as const;
 
 test("what cannot be sent is told why", () => {
   expect(deformationFault(translation([1, 2, 3]))).toBeNull();
   expect(deformationFault(translation([1, Number.NaN, 3]))).toMatch(/vector/);
-  expect(deformationFault(rotation([0, 0, 0], [0, 0, 0], 10))).toMatch(/direction/);
-  expect(deformationFault(rotation([0, 0, 0], [0, 1, 0], Number.NaN))).toMatch(/angle/);
-  expect(isIdentity(translation([0, 0, 0]))).toBe(true);
-  expect(isIdentity(rotation([0, 0, 0], [0, 1, 0], 0))).toBe(true);
-  expect(describeDeformation(rotation([0, 0, 0], [0, 1, 0], 12.34567))).toBe("Rotate 12.35° about 0, 1, 0");
+  expect(deformationFault(rotation(O, O, 10))).toMatch(/direction/);
+  expect(deformationFault(rotation(O, Y, Number.NaN))).toMatch(/angle/);
+  expect(deformationFault(rotation(O, Y, 36_001))).toMatch(/100 turns/);
+  expect(deformationFault(scaling(O, [1, 0.001, 1000]))).toBeNull();
+  expect(deformationFault(scaling(O, [1, 0, 1]))).toMatch(/factor/);
+  expect(deformationFault(scaling(O, [1, 1, 1001]))).toMatch(/factor/);
+  expect(deformationFault(scaling(O, [1, Number.NaN, 1]))).toMatch(/factor/);
+  expect(deformationFault(scaling([0, Number.NaN, 0], [1, 2, 1]))).toMatch(/pivot/);
+  expect(deformationFault(twisting(O, Y, 90, 0.5))).toBeNull();
+  expect(deformationFault(twisting(O, Y, 90, 0))).toMatch(/length/);
+  expect(deformationFault(twisting(O, O, 90, 1))).toMatch(/direction/);
+  expect(deformationFault(alongNormal(-3))).toBeNull();
+  expect(deformationFault(alongNormal(Number.NaN))).toMatch(/distance/);
+  expect(deformationFault({ type: "sequence", steps: [scaling(O, [0, 1, 1]) as never] })).toMatch(/factor/);
 });
 
-/** The residual takes what is shown to what is wanted, for every t. */
-function expectComposes(shown: Deformation | null, wanted: Deformation | null): void {
-  const rest = residual(shown, wanted);
-  expect(rest).not.toBeNull();
-  for (const t of [0, 0.3, 1]) {
-    const p: Vec3 = [0.3, -0.7, 1.1];
-    const there = shown ? deform(p, shown, t) : p;
-    const goal = wanted ? deform(p, wanted, t) : p;
-    expectVector(rest ? deform(there, rest, t) : there, goal);
-  }
-}
-
-test("what the hand is ahead of the server composes with the frame on the screen", () => {
-  const axis: Vec3 = [0.2, 0.9, -0.3];
-  const point: Vec3 = [0.1, 0.2, 0.3];
-  expectComposes(null, translation([1, 2, 3]));
-  expectComposes(translation([1, 0, 0]), translation([1, 2, 3]));
-  expectComposes(translation([1, 2, 3]), null);
-  expectComposes(null, rotation(point, axis, 50));
-  expectComposes(rotation(point, axis, 20), rotation(point, axis, 50));
-  expectComposes(rotation(point, axis, 50), null);
-  expectComposes(rotation(point, [-0.2, -0.9, 0.3], 20), rotation(point, axis, 50));
-  expectComposes(rotation([0.1 + 0.2, 0.2 + 0.9, 0.3 - 0.3], axis, 20), rotation(point, axis, 50));
+test("what moves nothing is known", () => {
+  const still: Deformation[] = [
+    translation(O),
+    rotation(O, Y, 0),
+    scaling([1, 2, 3], [1, 1, 1]),
+    twisting(O, Y, 0, 2),
+    alongNormal(0),
+    { type: "toward_point", target: [1, 1, 1], amount: 0 },
+    { type: "sequence", steps: [{ type: "translation", vector: O }] },
+  ];
+  for (const each of still) expect(isIdentity(each), each.type).toBe(true);
+  for (const each of [scaling(O, [1, 1, 1.01]), twisting(O, Y, 1, 2), alongNormal(-1)])
+    expect(isIdentity(each), each.type).toBe(false);
 });
 
-test("deformations that do not compose are left to the server", () => {
-  expect(residual(translation([1, 0, 0]), rotation([0, 0, 0], [0, 1, 0], 5))).toBeNull();
-  expect(residual(rotation([0, 0, 0], [0, 1, 0], 5), translation([1, 0, 0]))).toBeNull();
-  expect(residual(rotation([0, 0, 0], [0, 1, 0], 5), rotation([0, 0, 0], [1, 0, 0], 5))).toBeNull();
-  expect(residual(rotation([1, 0, 0], [0, 1, 0], 5), rotation([0, 0, 0], [0, 1, 0], 5))).toBeNull();
+test("edits in words", () => {
+  expect(describeDeformation(rotation(O, Y, 12.34567))).toBe("Turned 12.35° about 0, 1, 0");
+  expect(describeDeformation(translation([0, 0.5, 0]))).toBe("Moved 0, 0.5, 0");
+  expect(describeDeformation(scaling(O, [1.5, 1.5, 1.5]))).toBe("Scaled 1.5×");
+  expect(describeDeformation(scaling(O, [1, 2, 1]))).toBe("Scaled 1, 2, 1×");
+  expect(describeDeformation(twisting(O, Y, 90, 2))).toBe("Twisted 90°");
+  expect(describeDeformation(alongNormal(0.25))).toBe("Raised 0.25");
+  expect(describeDeformation(alongNormal(-0.25))).toBe("Carved 0.25");
+  expect(describeDeformation({ type: "toward_point", target: [1, 2, 3], amount: 0.25 })).toBe(
+    "Drawn 25 % toward 1, 2, 3",
+  );
+  const steps = [
+    { type: "translation", vector: [1, 0, 0] },
+    { type: "scale", center: O, factors: [2, 2, 2] },
+  ] as const;
+  expect(describeDeformation({ type: "sequence", steps: [...steps] })).toBe("Moved 1, 0, 0, then Scaled 2×");
+  expect(describeEdit({ level: 0, deformation: twisting(O, Y, 90, 2) })).toBe("Twisted 90°");
+  expect(describeEdit({ level: 0, deformation: twisting(O, Y, 90, 2), gains: [0, 1] })).toBe(
+    "Twisted 90°, detail 0, 1×",
+  );
+  expect(describeEdit({ level: 0, deformation: translation(O), gains: [1.5, 1.5] })).toBe("Detail 1.5×");
+});
+
+test("a pivot is the point that a deformation starts from", () => {
+  const to = [1, 2, 3] as const;
+  expect(withPivot(scaling(O, [2, 2, 2]), to)).toEqual(scaling(to, [2, 2, 2]));
+  expect(withPivot(twisting(O, Y, 90, 2), to)).toEqual(twisting(to, Y, 90, 2));
+  expect(withPivot(rotation(O, Y, 90), to)).toEqual(rotation(to, Y, 90));
+  expect(withPivot(translation([1, 0, 0]), to)).toBeNull();
 });

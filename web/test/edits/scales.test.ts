@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { DEFAULT_SCALES, levelName, parseScales, scalesText } from "../../src/edits/scales";
+import { bandName, DEFAULT_SCALES, levelName, parseScales, scalesText } from "../../src/edits/scales";
 
 test("scales are read as people write them, the coarsest first", () => {
   expect(parseScales("4, 2, 1")).toEqual([0.04, 0.02, 0.01]);
@@ -18,4 +18,11 @@ test("what cannot be scales is told why", () => {
 test("levels are named by what their base smooths away", () => {
   expect(levelName({ level: 0, scale: 0.08 }, 2)).toBe("Level 0 (4 %)");
   expect(levelName({ level: 3, scale: 0 }, 2)).toBe("Level 3");
+});
+
+test("bands of detail are named by the scales that they lie between", () => {
+  const levels = [{ scale: 0.08 }, { scale: 0.04 }, { scale: 0 }];
+  expect(bandName(levels, 0, 2)).toBe("4 % to 2 %");
+  expect(bandName(levels, 1, 2)).toBe("Below 2 %");
+  expect(bandName([{ scale: 0 }, { scale: 0 }], 0, 2)).toBe("Band 0");
 });

@@ -6,18 +6,11 @@ import type {
   SessionDocument,
   Shape,
 } from "../../src/api/types";
-import {
-  distance,
-  distanceToSegment,
-  dot,
-  length,
-  normalise,
-  subtract,
-  type Vec3,
-} from "../../src/math/vec3";
+import { distance, distanceToSegment, dot, length, subtract, type Vec3 } from "../../src/math/vec3";
 import { encodeFrame } from "../../src/protocol/frame-tools";
 import { type FrameBlock, type FrameHeader, frameAttributes } from "../../src/protocol/frames";
 import { layerSizes } from "../../src/scene/layers";
+import { deform } from "./deform";
 import type { MockShape } from "./shapes";
 
 const BLOCK = 4096;
@@ -62,6 +55,11 @@ export class MockSession {
     return [p[3 * i] ?? 0, p[3 * i + 1] ?? 0, p[3 * i + 2] ?? 0];
   }
 
+  private normal(i: number): Vec3 {
+    const n = this.shape_.normals;
+    return [n[3 * i] ?? 0, n[3 * i + 1] ?? 0, n[3 * i + 2] ?? 0];
+  }
+
   document(): SessionDocument {
     const diagonal = distance(this.lower_, this.upper_);
     const samples = (mark: number): number => this.marks.reduce((sum, m) => sum + (m === mark ? 1 : 0), 0);
@@ -96,10 +94,7 @@ export class MockSession {
     const own = region === "zero" ? 1 : 2;
     let changed = 0;
     for (let i = 0; i < this.shape_.count; ++i) {
-      const n = this.shape_.normals;
-      const facing = operation.facing
-        ? dot(operation.facing, [n[3 * i] ?? 0, n[3 * i + 1] ?? 0, n[3 * i + 2] ?? 0]) > 0
-        : true;
+      const facing = operation.facing ? dot(operation.facing, this.normal(i)) > 0 : true;
       if (!facing || !contains(operation.shape, this.position(i))) continue;
       const mark = this.marks[i] ?? 0;
       const next =
@@ -204,7 +199,7 @@ export class MockSession {
     for (let lane = 0; lane < count; ++lane) {
       const i = this.order_[from + lane] ?? 0;
       let p = this.position(i);
-      for (const deformation of deformations) p = deform(p, deformation, this.t_[i] ?? 0);
+      for (const deformation of deformations) p = deform(p, deformation, this.t_[i] ?? 0, this.normal(i));
       p = subtract(p, this.origin);
       points.push(p);
       p.forEach((value, axis) => {
@@ -233,8 +228,7 @@ export class MockSession {
           extent > 0 ? Math.round((65535 * (value - (block.minimum[axis] ?? 0))) / extent) : 0;
       });
       block.positionT[4 * lane + 3] = Math.round(65535 * (this.t_[i] ?? 0));
-      const n = this.shape_.normals;
-      block.normal?.set(octahedral([n[3 * i] ?? 0, n[3 * i + 1] ?? 0, n[3 * i + 2] ?? 0]), 2 * lane);
+      block.normal?.set(octahedral(this.normal(i)), 2 * lane);
       if (block.detailStretch)
         block.detailStretch[2 * lane] = Math.round(((this.shape_.detail[i] ?? 0) / 0.06) * 32767) & 0xffff;
       if (block.marks) block.marks[lane] = this.marks[i] ?? 0;
@@ -269,29 +263,6 @@ function contains(shape: Shape, p: Vec3): boolean {
   return shape.vertices.some(
     (vertex, i) => distanceToSegment(p, vertex, shape.vertices[i + 1] ?? vertex) <= shape.radius,
   );
-}
-
-export function deform(p: Vec3, deformation: Deformation, t: number): Vec3 {
-  if (deformation.type === "translation")
-    return [
-      p[0] + t * deformation.vector[0],
-      p[1] + t * deformation.vector[1],
-      p[2] + t * deformation.vector[2],
-    ];
-  const axis = normalise(deformation.axis.direction);
-  const r = subtract(p, deformation.axis.point);
-  const angle = (t * deformation.angle_deg * Math.PI) / 180;
-  const c = Math.cos(angle);
-  const s = Math.sin(angle);
-  const along = dot(axis, r) * (1 - c);
-  const x: Vec3 = [
-    axis[1] * r[2] - axis[2] * r[1],
-    axis[2] * r[0] - axis[0] * r[2],
-    axis[0] * r[1] - axis[1] * r[0],
-  ];
-  return [0, 1, 2].map(
-    (k) => (deformation.axis.point[k] ?? 0) + (r[k] ?? 0) * c + (x[k] ?? 0) * s + (axis[k] ?? 0) * along,
-  ) as unknown as Vec3;
 }
 
 function octahedral(n: Vec3): [number, number] {

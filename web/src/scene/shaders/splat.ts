@@ -23,11 +23,13 @@ uniform float splatScale;     // of the radii that samples bring
 uniform float pixelScale;     // pixels that one world unit spans at depth 1
 uniform float maxPointSize;
 
-// The part of the deformation that the hand is ahead of the server: 0 none, 1 translation, 2 rotation.
+// The part of the deformation that the hand is ahead of the server: 0 none, 1 translation, 2 rotation, 3 scale, 4 twist,
+// 5 along the normal.
 uniform int residualKind;
-uniform vec3 residualVector;  // translation, or unit axis
+uniform vec3 residualVector;   // translation, unit axis, or factors less 1
 uniform vec3 residualPoint;
-uniform float residualAngle;
+uniform vec3 residualFrom;     // factors less 1 that the frame shows already
+uniform float residualAmount;  // angle, angle a unit of height, or distance
 
 flat out vec3 vCenter;
 flat out vec3 vNormal;
@@ -42,6 +44,30 @@ vec3 decodeNormal(vec2 e) {
 vec3 turn(vec3 v, vec3 axis, float angle) {
   float c = cos(angle);
   return v * c + cross(axis, v) * sin(angle) + axis * dot(axis, v) * (1.0 - c);
+}
+
+// F(p, t) of what the hand is ahead, and the cofactors of dF/dp on the normal. Answers how far samples move apart.
+float deformAhead(float t, inout vec3 p, inout vec3 normal) {
+  vec3 from = p - residualPoint;
+  if (residualKind == 1) {
+    p += t * residualVector;
+  } else if (residualKind == 2) {
+    p = residualPoint + turn(from, residualVector, t * residualAmount);
+    normal = turn(normal, residualVector, t * residualAmount);
+  } else if (residualKind == 3) {
+    vec3 factors = (1.0 + t * residualVector) / (1.0 + t * residualFrom);
+    p = residualPoint + factors * from;
+    normal = normalize(normal / factors);
+    return max(1.0, max(factors.x, max(factors.y, factors.z)));
+  } else if (residualKind == 4) {
+    float angle = t * residualAmount * dot(residualVector, from);
+    vec3 shear = t * residualAmount * cross(residualVector, from);
+    p = residualPoint + turn(from, residualVector, angle);
+    normal = normalize(turn(normal - dot(shear, normal) * residualVector, residualVector, angle));
+  } else if (residualKind == 5) {
+    p += t * residualAmount * normal;
+  }
+  return 1.0;
 }
 
 float decodeStretch(float bits) {
@@ -65,12 +91,7 @@ bool placeSplat(out vec3 normal) {
   vec3 p = lower.xyz + texelFetch(blockTable, at + ivec2(1, 0), 0).xyz * position.xyz;
   normal = decodeNormal(octahedral);
   float t = position.w;
-  if (residualKind == 1) {
-    p += t * residualVector;
-  } else if (residualKind == 2) {
-    p = residualPoint + turn(p - residualPoint, residualVector, t * residualAngle);
-    normal = turn(normal, residualVector, t * residualAngle);
-  }
+  float spread = deformAhead(t, p, normal);
   vec4 center = viewMatrix * vec4(p, 1.0);
   vec3 n = mat3(viewMatrix) * normal;
   vec3 ray = normalize(center.xyz);
@@ -82,7 +103,7 @@ bool placeSplat(out vec3 normal) {
   vCenter = center.xyz;
   vNormal = n;
   float own = uintBitsToFloat(uint(radius) << 16) * splatScale;
-  vRadius = (own > 0.0 ? own : splatRadius) * stretch;
+  vRadius = (own > 0.0 ? own : splatRadius) * stretch * spread;
   gl_Position = projectionMatrix * center;
   gl_PointSize = clamp(2.0 * vRadius * pixelScale / max(-center.z, 1e-20) + 1.0, 1.5, maxPointSize);
   return true;

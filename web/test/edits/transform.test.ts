@@ -1,0 +1,121 @@
+import { expect, test } from "vitest";
+import { ApiClient } from "../../src/api/client";
+import type { SessionDocument } from "../../src/api/types";
+import { CommandQueue } from "../../src/command-queue";
+import { alongNormal, scaling, translation, twisting } from "../../src/edits/deformation";
+import { TransformEditor } from "../../src/edits/transform";
+import type { Notices, Questions } from "../../src/event-map";
+import { Events } from "../../src/events";
+import { SessionStore } from "../../src/session-store";
+import { MockSession } from "../mock/session";
+
+/** An editor over two bands of detail, and what it sends. */
+function bench(painted = true) {
+  const shape = {
+    count: 2,
+    positions: new Float32Array([0, 0, 0, 1, 1, 1]),
+    normals: new Float32Array([0, 0, 1, 0, 0, 1]),
+    detail: new Float32Array(2),
+  };
+  const samples = painted ? 1 : 0;
+  const document: SessionDocument = {
+    ...new MockSession("session", "Name", shape).document(),
+    levels: [0.04, 0.02, 0].map((scale, level) => ({ level, scale })),
+    regions: { zero: { samples, operations: 1 }, one: { samples, operations: 1 } },
+  };
+  const sent: { method: string; path: string; body: Record<string, unknown> }[] = [];
+  const toasts: string[] = [];
+  const client = new ApiClient("http://host/", async (url, init) => {
+    const method = init?.method ?? "GET";
+    if (method !== "GET")
+      sent.push({
+        method,
+        path: new URL(String(url)).pathname,
+        body: JSON.parse(String(init?.body ?? "{}")),
+      });
+    return new Response(JSON.stringify(document), { headers: { "Content-Type": "application/json" } });
+  });
+  const bus = new Events<Notices, Questions>();
+  bus.on("toast", ({ title }) => toasts.push(title));
+  const editor = new TransformEditor(
+    bus,
+    client,
+    new CommandQueue(),
+    new SessionStore(bus, document),
+    () => {},
+  );
+  const posted = (): Record<string, unknown>[] =>
+    sent.filter(({ method }) => method === "POST").map(({ body }) => body);
+  return { editor, sent, posted, toasts };
+}
+
+test("an edit is sent with its level, blend and deformation; detail only where it changes", async () => {
+  const { editor, posted, toasts } = bench();
+  const twist = twisting([0, 0, 0], [0, 1, 0], 90, 0.5);
+  editor.setBlend("quintic");
+  editor.setLevel(1);
+  editor.set(twist);
+  await editor.commit();
+  expect(posted()).toEqual([{ level: 1, blend: "quintic", deformation: twist }]);
+  expect(toasts).toEqual(["Twisted 90°"]);
+  expect(editor.pending).toBe(false);
+});
+
+test("the detail alone is an edit, of the bands that are rebuilt, and starts over with the next one", async () => {
+  const { editor, posted } = bench();
+  editor.setGain(1, 1.5);
+  expect(editor.pending).toBe(true);
+  expect(editor.description).toBe("Detail 1, 1.5×");
+  await editor.commit();
+  expect(posted()).toEqual([
+    { level: 0, blend: "quartic", deformation: translation([0, 0, 0]), gains: [1, 1.5] },
+  ]);
+  expect(editor.state.gains).toEqual([1, 1]);
+  editor.setLevel(2);
+  editor.setGain(0, 0);
+  expect(editor.pending).toBe(false);
+  await editor.commit();
+  expect(posted().length).toBe(1);
+  editor.setLevel(0);
+  expect(editor.pending).toBe(true);
+  editor.cancel();
+  expect(editor.state.gains).toEqual([1, 1]);
+  expect(editor.description).toBe("");
+});
+
+test("previews say the same as the edit that follows, and a number", async () => {
+  const { editor, sent } = bench();
+  editor.setGain(0, 0.5);
+  await editor.preview.idle();
+  editor.set(alongNormal(-0.25));
+  await editor.preview.idle();
+  const { method, path, body } = sent.at(-1) ?? {};
+  expect([method, path]).toEqual(["PUT", "/v1/sessions/session/preview"]);
+  expect(body).toMatchObject({ level: 0, deformation: alongNormal(-0.25), gains: [0.5, 1] });
+  expect(body?.["sequence"]).toBe(editor.preview.lastSequence);
+});
+
+test("the pivot, the axis and the length carry a deformation along", () => {
+  const { editor } = bench();
+  editor.set(scaling([0, 0, 0], [2, 2, 2]));
+  editor.setPivot([1, 2, 3]);
+  expect(editor.state.deformation).toEqual(scaling([1, 2, 3], [2, 2, 2]));
+  editor.set(twisting([0, 0, 0], [0, 1, 0], 30, 1));
+  editor.setPivot([4, 5, 6]);
+  editor.setAxis("x");
+  expect(editor.state.deformation).toEqual(twisting([4, 5, 6], [1, 0, 0], 30, 1));
+  editor.setTwist({ direction: [0, 0, 1], length: 2 });
+  expect(editor.state.deformation).toEqual(twisting([4, 5, 6], [0, 0, 1], 30, 2));
+});
+
+test("nothing is made without both regions, or of what the server refuses", async () => {
+  const { editor, sent } = bench(false);
+  editor.set(alongNormal(1));
+  editor.setGain(0, 0);
+  expect(editor.state.deformation).toBeNull();
+  const ready = bench().editor;
+  ready.set(scaling([0, 0, 0], [0, 1, 1]));
+  expect(ready.state.deformation).toBeNull();
+  await editor.commit();
+  expect(sent).toEqual([]);
+});
