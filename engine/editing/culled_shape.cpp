@@ -121,6 +121,7 @@ bool CapsuleTree::contains(std::uint32_t capsule, const Vec3d& point) const {
 CulledShape::CulledShape(const Shape& shape) : shape_(&shape) {
   if (const auto* stroke = std::get_if<Stroke>(&shape)) tree_.emplace(*stroke);
   if (const auto* points = std::get_if<PointSet>(&shape)) tree_.emplace(*points);
+  if (const auto* screen = std::get_if<ScreenShape>(&shape)) outline_.emplace(*screen);
 }
 
 bool CulledShape::may_cover(const Box3d& box, std::vector<std::uint32_t>& capsules) const {
@@ -139,6 +140,10 @@ bool CulledShape::may_cover(const Box3d& box, const std::vector<std::uint32_t>& 
 }
 
 bool CulledShape::covers(const Vec3d& point, const std::vector<std::uint32_t>& capsules) const {
+  if (outline_) {
+    const std::optional<Vec2d> place = project(std::get<ScreenShape>(*shape_), point);
+    return place && outline_->contains(*place);
+  }
   if (!tree_) return contains(*shape_, point);
   return std::any_of(capsules.begin(), capsules.end(),
                      [&](std::uint32_t i) { return tree_->contains(i, point); });

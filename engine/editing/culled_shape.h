@@ -78,6 +78,7 @@ class CulledShape {
 
   const Shape* shape_;
   std::optional<CapsuleTree> tree_;
+  std::optional<BandedOutline> outline_;
 };
 
 }  // namespace pointwright

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
@@ -66,6 +67,7 @@ Changes changes_of(PaintMode mode) {
   switch (mode) {
     case PaintMode::kAdd:
     case PaintMode::kGrow:
+    case PaintMode::kFlood:
       return {.covered = Change::kJoins};
     case PaintMode::kRemove:
     case PaintMode::kShrink:
@@ -97,12 +99,19 @@ std::uint8_t changed_mark(std::uint8_t mark, Change change, std::uint8_t own, st
   return mark;
 }
 
+SampleMask marked(const Marks& marks, std::uint8_t bit) {
+  SampleMask mask(marks.size());
+  std::ranges::transform(marks, mask.begin(), [bit](std::uint8_t mark) { return (mark & bit) != 0 ? 1 : 0; });
+  return mask;
+}
+
 // The samples that growing takes in, or that shrinking gives up.
 SampleMask at_border(const PaintOperation& operation, std::uint8_t own, const Points& position,
                      const Marks& marks, const ExecutionContext* context) {
-  SampleMask side(marks.size());
-  const bool grows = operation.mode == PaintMode::kGrow;
-  for (std::size_t i = 0; i < marks.size(); ++i) side[i] = ((marks[i] & own) != 0) == grows ? 1 : 0;
+  SampleMask side = marked(marks, own);
+  if (operation.mode == PaintMode::kShrink) {
+    for (std::uint8_t& member : side) member ^= 1U;
+  }
   return near_members(position, side, operation.distance, context);
 }
 
@@ -124,6 +133,25 @@ Result<void> check_distance(double distance) {
   if (distance > kMaxShapeCoordinate) {
     return distance_error(ErrorCode::kOutOfRange, "the distance must be at most 1e12", kMaxShapeCoordinate,
                           distance);
+  }
+  return {};
+}
+
+Result<void> check_flood(const FloodFill& flood) {
+  if (auto seed = validate(Sphere{.center = flood.seed, .radius = flood.radius.value_or(1.0)}); !seed) {
+    Error error = seed.error();
+    error.field = error.field == "shape.radius" ? "radius" : "seed";
+    return error;
+  }
+  if (!flood.angle_rad) return {};
+  if (!std::isfinite(*flood.angle_rad))
+    return Error{.code = ErrorCode::kNonFinite, .message = "the angle must be finite", .field = "angle"};
+  if (*flood.angle_rad < 0.0 || *flood.angle_rad > std::numbers::pi) {
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "the angle must lie between 0 and 180 degrees",
+                 .field = "angle",
+                 .limit = *flood.angle_rad < 0.0 ? 0.0 : std::numbers::pi,
+                 .actual = *flood.angle_rad};
   }
   return {};
 }
@@ -159,6 +187,9 @@ Result<void> validate(const PaintOperation& operation) {
   if (has_distance(operation.mode)) {
     if (auto distance = check_distance(operation.distance); !distance) return distance;
   }
+  if (operation.mode == PaintMode::kFlood) {
+    if (auto flood = check_flood(operation.flood); !flood) return flood;
+  }
   return check_facing(operation);
 }
 
@@ -173,6 +204,12 @@ std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintS
   const Changes changes = changes_of(operation.mode);
   SampleMask chosen;
   if (has_distance(operation.mode)) chosen = at_border(operation, own, surface.position, marks, context);
+  if (operation.mode == PaintMode::kFlood) {
+    POINTWRIGHT_CHECK(surface.graph != nullptr && surface.graph->count == n, "the graph of the samples");
+    SampleMask blocked;
+    if (operation.flood.stop_at_other) blocked = marked(marks, other);
+    chosen = flood_fill(surface, operation.flood, blocked, context);
+  }
   std::optional<ShapeCover> shape;
   if (has_shape(operation.mode)) shape.emplace(operation, surface);
 

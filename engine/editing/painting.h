@@ -9,6 +9,7 @@
 #include "engine/core/points.h"
 #include "engine/core/result.h"
 #include "engine/editing/shape.h"
+#include "engine/spatial/neighbor_graph.h"
 
 namespace pointwright {
 
@@ -27,6 +28,15 @@ enum class PaintMode {
   kClear,      ///< all leave
   kGrow,       ///< samples within `distance` of a member join
   kShrink,     ///< members within `distance` of a sample that is none leave
+  kFlood,      ///< samples that `flood` reaches join
+};
+
+/// Fills the surface from the sample nearest to the seed, over neighbours; any combination of bounds.
+struct FloodFill {
+  Vec3d seed = Vec3d::Zero();
+  std::optional<double> angle_rad;  ///< not across a greater angle between the normals of neighbours
+  std::optional<double> radius;     ///< only within this distance of the seed
+  bool stop_at_other = false;       ///< not onto samples of the other region
 };
 
 /// Whether the mode paints with a shape.
@@ -44,17 +54,20 @@ struct PaintOperation {
   /// refuses.
   bool steal = false;
   double distance = 0.0;  ///< of kGrow and kShrink, model units
+  FloodFill flood = {};   ///< of kFlood
 };
 
 /// Errors: those of the shape; kInvalidArgument for a zero `facing`, for one without a shape (field "facing")
-/// and for a distance that is not greater than 0 (field "distance"); kNonFinite, kOutOfRange.
+/// and for a distance that is not greater than 0 (field "distance"); kNonFinite, kOutOfRange; the fields of a
+/// flood are "seed", "angle" and "radius".
 Result<void> validate(const PaintOperation& operation);
 
 /// The surface that is painted: its columns belong to the caller.
 struct PaintSurface {
   const Points& position;  ///< relative to `origin`
-  const Points& normal;    ///< read only for `facing`
+  const Points& normal;    ///< read only for `facing` and for angles
   const Vec3d& origin;
+  const NeighborGraph* graph = nullptr;  ///< of its samples; read only for kFlood
 };
 
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
@@ -63,7 +76,8 @@ struct PaintSurface {
 ///              segments once, O(log V) for each range of kParallelBlock samples, and a test of each of a
 ///              block's 128 samples against the segments within the radius of that block. Long segments whose
 ///              bounding boxes hold all samples are each tested once a range; where all of them pass through
-///              all blocks it is O(N V). Growing and shrinking: near_members()
+///              all blocks it is O(N V). Growing and shrinking: near_members(),
+///              filling: flood_fill()
 /// Determinism: bitwise equal for any thread count
 /// Cancels:     between blocks of samples; the marks are then incomplete and must be dropped
 std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface, Marks& marks,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
@@ -21,6 +22,46 @@ Region region_of(const Points& position, const SampleMask& members) {
   }
   return Region(centers, std::vector<float>(count, 0.0F), BallOrder::kCoherent);
 }
+
+// A sample and its distance; the nearest of many, ties by index.
+struct Nearest {
+  double distance_sq = std::numeric_limits<double>::infinity();
+  std::size_t sample = 0;
+
+  friend Nearest operator+(const Nearest& a, const Nearest& b) {
+    return b.distance_sq < a.distance_sq ? b : a;
+  }
+};
+
+// Whether normals are at most some angle apart; no angle is found to be greater than 0 between equal normals.
+class AngleLimit {
+ public:
+  explicit AngleLimit(double angle)
+      : everything_(angle >= std::numbers::pi),
+        obtuse_(angle > 0.5 * std::numbers::pi),
+        sin_sq_(std::sin(angle) * std::sin(angle)),
+        cos_sq_(std::cos(angle) * std::cos(angle)) {}
+
+  [[nodiscard]] bool holds(const Vec3f& a, const Vec3f& b) const {
+    if (everything_) return true;
+    const Vec3d u = a.cast<double>();
+    const Vec3d v = b.cast<double>();
+    const double dot = u.dot(v);
+    // |u x v| = |u||v| sin, u . v = |u||v| cos: their ratio orders the angles of each quadrant.
+    const double sine = cos_sq_ * u.cross(v).squaredNorm();
+    const double cosine = sin_sq_ * dot * dot;
+    return obtuse_ ? dot >= 0.0 || sine >= cosine : dot >= 0.0 && sine <= cosine;
+  }
+
+ private:
+  bool everything_;
+  bool obtuse_;
+  double sin_sq_;
+  double cos_sq_;
+};
+
+// How many samples are filled between two looks at the context.
+constexpr std::size_t kFillBlock = 4096;
 
 }  // namespace
 
@@ -45,6 +86,48 @@ SampleMask near_members(const Points& position, const SampleMask& members, doubl
       },
       kParallelBlock, context);
   return near;
+}
+
+SampleMask flood_fill(const PaintSurface& surface, const FloodFill& flood, const SampleMask& blocked,
+                      const ExecutionContext* context) {
+  const Points& position = surface.position;
+  const std::size_t n = position.size();
+  SampleMask filled(n, 0);
+  const auto distance_sq = [&](std::size_t i) {
+    return (surface.origin + position[i].cast<double>() - flood.seed).squaredNorm();
+  };
+  const auto nearest = parallel_sum<Nearest>(n, {}, [&](std::size_t begin, std::size_t end) {
+    Nearest best;
+    if (context != nullptr && context->is_cancelled()) return best;
+    for (std::size_t i = begin; i < end; ++i)
+      best = best + Nearest{.distance_sq = distance_sq(i), .sample = i};
+    return best;
+  });
+  if (!std::isfinite(nearest.distance_sq)) return filled;
+
+  const AngleLimit angle(flood.angle_rad.value_or(std::numbers::pi));
+  const double radius_sq =
+      flood.radius ? *flood.radius * *flood.radius : std::numeric_limits<double>::infinity();
+  std::vector<std::uint32_t> open;
+  const auto fill = [&](std::size_t i) {
+    if (filled[i] != 0 || (!blocked.empty() && blocked[i] != 0) || distance_sq(i) > radius_sq) return;
+    filled[i] = 1;
+    open.push_back(static_cast<std::uint32_t>(i));
+  };
+  fill(nearest.sample);
+  for (std::size_t count = 0; !open.empty(); ++count) {
+    if (count % kFillBlock == 0 && context != nullptr && context->is_cancelled()) return filled;
+    const std::size_t from = open.back();
+    open.pop_back();
+    const auto spread = [&](std::size_t to) {
+      if (!flood.angle_rad || angle.holds(surface.normal[from], surface.normal[to])) fill(to);
+    };
+    for (std::uint32_t j = 0; j < surface.graph->k; ++j) spread(surface.graph->index(from, j));
+    // Lists hold one of several samples that stand in one place: the others are beside it.
+    if (from > 0 && position[from - 1] == position[from]) spread(from - 1);
+    if (from + 1 < n && position[from + 1] == position[from]) spread(from + 1);
+  }
+  return filled;
 }
 
 }  // namespace pointwright

@@ -1,5 +1,5 @@
 #pragma once
-// Sets of samples that depend on the sampling: what lies near the members of a region.
+// Sets of samples that depend on the sampling: what lies near the members of a region, and what a flood reaches.
 
 #include <cstdint>
 #include <vector>
@@ -21,5 +21,15 @@ using SampleMask = std::vector<std::uint8_t>;
 /// Cancels:     between blocks; the answer is then incomplete and must be dropped
 SampleMask near_members(const Points& position, const SampleMask& members, double distance,
                         const ExecutionContext* context = nullptr);
+
+/// The samples that a flood reaches from the one nearest to its seed (of equally near ones the first), each
+/// from its nearest neighbours' lists: a sample that stands on nobody's list is not reached. Duplicates that
+/// are adjacent are neighbours too. None where the first sample is `blocked` or outside the radius.
+/// Shapes:      N positions, normals where the angle bounds, a graph; N entries of `blocked`, or none
+/// Cost:        O(N) to find the first sample, parallel; O(k) for each sample reached
+/// Determinism: bitwise equal for any thread count
+/// Cancels:     between blocks of samples; the answer is then incomplete and must be dropped
+SampleMask flood_fill(const PaintSurface& surface, const FloodFill& flood, const SampleMask& blocked,
+                      const ExecutionContext* context = nullptr);
 
 }  // namespace pointwright

@@ -117,6 +117,10 @@ Result<void> validate_one(const Everything&) {
   return {};
 }
 
+Result<void> validate_one(const ScreenShape& shape) {
+  return validate_screen_shape(shape);
+}
+
 bool contains_one(const Sphere& sphere, const Vec3d& point) {
   return (point - sphere.center).squaredNorm() <= sphere.radius * sphere.radius;
 }
@@ -151,6 +155,11 @@ bool contains_one(const Everything&, const Vec3d&) {
   return true;
 }
 
+bool contains_one(const ScreenShape& shape, const Vec3d& point) {
+  const std::optional<Vec2d> place = project(shape, point);
+  return place && outline_contains(shape, *place);
+}
+
 }  // namespace
 
 Result<void> validate(const Shape& shape) {
@@ -164,6 +173,7 @@ bool contains(const Shape& shape, const Vec3d& point) {
 std::size_t vertex_count(const Shape& shape) {
   if (const auto* stroke = std::get_if<Stroke>(&shape)) return stroke->vertices.size();
   if (const auto* set = std::get_if<PointSet>(&shape)) return set->points.size();
+  if (const auto* screen = std::get_if<ScreenShape>(&shape)) return outline_vertex_count(*screen);
   return 0;
 }
 

@@ -8,6 +8,7 @@
 
 #include "engine/core/result.h"
 #include "engine/core/vector.h"
+#include "engine/editing/screen_shape.h"
 
 namespace pointwright {
 
@@ -45,18 +46,19 @@ struct HalfSpace {
 /// All of space.
 struct Everything {};
 
-using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything, PointSet>;
+using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything, PointSet, ScreenShape>;
 
 /// Finite members within kMaxShapeCoordinate, radii > 0, min <= max, a normal that is not zero, at least one
 /// and at most kMaxStrokeVertices vertices or points.
 /// Errors: kInvalidArgument (field "shape.radius" and the like), kNonFinite, kOutOfRange, kTooLarge.
 Result<void> validate(const Shape& shape);
 
-/// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for strokes and
-/// point sets.
+/// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for strokes, point
+/// sets and outlines.
 bool contains(const Shape& shape, const Vec3d& point);
 
-/// Vertices that the shape counts with against the limit of a painting: those of strokes and point sets.
+/// Vertices that the shape counts with against the limit of a painting: those of strokes, point sets and
+/// outlines.
 std::size_t vertex_count(const Shape& shape);
 
 /// Squared distance from the point to the segment from a to b, which may be one point.

@@ -63,8 +63,10 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
   const Level& finest = before->surface.surface->finest();
-  const PaintSurface surface{
-      .position = finest.position, .normal = finest.normal, .origin = params_.cloud->origin};
+  const PaintSurface surface{.position = finest.position,
+                             .normal = finest.normal,
+                             .origin = params_.cloud->origin,
+                             .graph = rest_.graph.get()};
   for (const PaintOperation& operation : operations) {
     pointwright::paint(operation, kind, surface, *marks, &context_);
     if (auto open = check_open(); !open.ok()) return open.problem();

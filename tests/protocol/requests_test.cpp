@@ -120,6 +120,68 @@ TEST_CASE("points have one radius or one each") {
   CHECK(faults(R"("points":[[0,0]],"radius":1)") == Pointers{"/shape/points/0"});
 }
 
+TEST_CASE("screen shapes have a view of 16 numbers and one outline") {
+  const std::string view = R"("view":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,-1,5])";
+  const auto faults = [](const std::string& members) {
+    return refused(R"({"mode":"add","shape":{"type":"screen",)" + members + "}}", parse_paint_operation);
+  };
+  const auto with = [&](const std::string& outline) { return faults(view + R"(,"outline":)" + outline); };
+  const auto read =
+      accepted(R"({"mode":"set","shape":{"type":"screen",)" + view +
+                   R"(,"outline":{"type":"polyline","vertices":[[0,0.5],[1,2]],"width":0.25}}})",
+               parse_paint_operation);
+  const auto& screen = std::get<ScreenShape>(read.shape);
+  CHECK(screen.view[14] == -1.0);
+  CHECK(screen.view[15] == 5.0);
+  CHECK(std::get<ScreenPolyline>(screen.outline).vertices[1] == Vec2d(1, 2));
+  CHECK(std::get<ScreenPolyline>(screen.outline).width == 0.25);
+  CHECK(faults(view) == Pointers{"/shape/outline"});
+  CHECK(faults(R"("view":[1,2],"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]})") ==
+        Pointers{"/shape/view"});
+  CHECK(with(R"({"type":"blob"})") == Pointers{"/shape/outline/type"});
+  CHECK(with(R"({"type":"polygon","vertices":[[0,0],[1,1]]})") == Pointers{"/shape/outline/vertices"});
+  CHECK(with(R"({"type":"polygon","vertices":[[0,0],[1,1],[1]]})") == Pointers{"/shape/outline/vertices/2"});
+  CHECK(with(R"({"type":"polygon","vertices":[[0,0],[1,1],[1,null]]})") ==
+        Pointers{"/shape/outline/vertices/2/1"});
+  CHECK(with(R"({"type":"ellipse","center":[0,0],"half_axes":[1,0]})") ==
+        Pointers{"/shape/outline/half_axes"});
+  CHECK(with(R"({"type":"polyline","vertices":[[0,0]],"width":-1})") == Pointers{"/shape/outline/width"});
+  CHECK(with(R"({"type":"ellipse","center":[0,0],"half_axes":[1,1],"width":1})") ==
+        Pointers{"/shape/outline/width"});
+  CHECK(
+      refused(
+          R"({"mode":"add","shape":{"type":"screen","view":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,0],"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]}}})",
+          parse_paint_operation) == Pointers{"/shape/view"});
+}
+
+TEST_CASE("floods have a seed and any bounds") {
+  const auto all = accepted(
+      R"({"mode":"flood","seed":[1,2,3],"angle_deg":90,"radius":0.5,"stop_at_other":true,"steal":true})",
+      parse_paint_operation);
+  CHECK(all.flood.seed == Vec3d(1, 2, 3));
+  CHECK(all.flood.angle_rad == std::numbers::pi / 2);
+  CHECK(all.flood.radius == 0.5);
+  CHECK(all.flood.stop_at_other);
+  CHECK(all.steal);
+  const auto none = accepted(R"({"mode":"flood","seed":[1,2,3]})", parse_paint_operation);
+  CHECK_FALSE(none.flood.angle_rad.has_value());
+  CHECK_FALSE(none.flood.radius.has_value());
+  CHECK_FALSE(none.flood.stop_at_other);
+  CHECK(accepted(R"({"mode":"flood","seed":[1,2,3],"angle_deg":180})", parse_paint_operation)
+            .flood.angle_rad.has_value());
+  const auto faults = [](const std::string& members) {
+    return refused(R"({"mode":"flood")" + members + "}", parse_paint_operation);
+  };
+  CHECK(faults("") == Pointers{"/seed"});
+  CHECK(faults(R"(,"seed":[1,2])") == Pointers{"/seed"});
+  CHECK(faults(R"(,"seed":[1,2,1e13])") == Pointers{"/seed"});
+  CHECK(faults(R"(,"seed":[1,2,3],"angle_deg":180.5)") == Pointers{"/angle_deg"});
+  CHECK(faults(R"(,"seed":[1,2,3],"angle_deg":null)") == Pointers{"/angle_deg"});
+  CHECK(faults(R"(,"seed":[1,2,3],"radius":0)") == Pointers{"/radius"});
+  CHECK(faults(R"(,"seed":[1,2,3],"stop_at_other":1)") == Pointers{"/stop_at_other"});
+  CHECK(faults(R"(,"seed":[1,2,3],"shape":{"type":"all"})") == Pointers{"/shape"});
+}
+
 TEST_CASE("the engine's verdict on values comes back with the document's pointer") {
   CHECK(refused(R"({"mode":"add","shape":{"type":"sphere","center":[0,0,0],"radius":0}})",
                 parse_paint_operation) == Pointers{"/shape/radius"});
@@ -265,8 +327,12 @@ TEST_CASE("what was read is written back and read again to the bit") {
        R"({"mode":"add","shape":{"type":"all"}})",
        R"({"mode":"add","shape":{"type":"points","points":[[0.1,0.0,2.0]],"radius":0.5}})",
        R"({"mode":"add","shape":{"type":"points","points":[[0.1,0.0,2.0],[1.0,0.0,0.0]],"radii":[0.5,0.25]}})",
-       R"({"mode":"invert","steal":true})", R"({"mode":"clear"})", R"({"mode":"grow","distance":0.1})",
-       R"({"mode":"shrink","distance":1e-09})"}) {
+       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"polygon","vertices":[[0.0,0.1],[1.0,0.0],[0.5,1.0]]}}})",
+       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"ellipse","center":[0.0,0.1],"half_axes":[1.0,0.3]}}})",
+       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"polyline","vertices":[[0.0,0.1]],"width":0.3}},"steal":true})",
+       R"({"mode":"flood","seed":[0.1,0.0,2.0],"angle_deg":33.3,"radius":0.5,"stop_at_other":true,"steal":true})",
+       R"({"mode":"flood","seed":[0.1,0.0,2.0]})", R"({"mode":"invert","steal":true})", R"({"mode":"clear"})",
+       R"({"mode":"grow","distance":0.1})", R"({"mode":"shrink","distance":1e-09})"}) {
     CHECK(to_json(accepted(text, parse_paint_operation)).dump() == text);
   }
   const char* edit =
