@@ -42,8 +42,8 @@ struct ScreenShape {
 };
 
 /// Errors: kNonFinite, kOutOfRange for members beyond 1e12; kInvalidArgument for a singular view, too few
-/// vertices, lengths that are not greater than 0; kTooLarge. Fields "shape.view", "shape.outline.vertices" and
-/// the like.
+/// vertices, lengths that are not greater than 0; kTooLarge. Fields "shape.view",
+/// "shape.outline.vertices" and the like.
 Result<void> validate_screen_shape(const ScreenShape& shape);
 
 /// Where the view shows the model-space point, in normalised device coordinates; nothing behind the eye.

@@ -1,5 +1,6 @@
 #pragma once
-// Sets of samples that depend on the sampling: what lies near the members of a region, and what a flood reaches.
+// Sets of samples that depend on the sampling: what lies near the members of a region, and what a flood
+// reaches.
 
 #include <cstdint>
 #include <vector>

@@ -12,8 +12,8 @@ namespace {
 constexpr std::uint8_t kZeroBit = 1;
 constexpr std::uint8_t kOneBit = 2;
 
-// A flat floor (y < 0) and a wall that stands on its edge (y = 0, z > 0), 20 samples wide, spacing 0.1; and an
-// island far away.
+// A flat floor (y < 0) and a wall that stands on its edge (y = 0, z > 0), 20 samples wide, spacing 0.1; and
+// an island far away.
 struct Corner {
   Points position, normal;
   NeighborGraph graph;
