@@ -31,7 +31,8 @@ struct Corner {
       }
     }
     for (int i = 0; i < 400; ++i) {
-      places.emplace_back(50.0F + 0.1F * static_cast<float>(i % 20), 0.1F * static_cast<float>(i / 20), 0.0F);
+      const int row = i / 20;
+      places.emplace_back(50.0F + 0.1F * static_cast<float>(i % 20), 0.1F * static_cast<float>(row), 0.0F);
       normals.push_back(Vec3f::UnitZ());
     }
     position = test::points_of(places);
@@ -103,7 +104,7 @@ TEST_CASE("floods are the same on any machine, steal, reach duplicates and take 
               marks) == 5);
   CHECK(marks == Marks(5, kZeroBit));
 
-  for (const std::size_t n : {0, 1, 2, 17}) {
+  for (const std::size_t n : {0UL, 1UL, 2UL, 17UL}) {
     const Points one_place(n);
     const NeighborGraph none = build_neighbor_graph(one_place, 8);
     Marks all(n, 0);
