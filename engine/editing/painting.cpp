@@ -1,242 +1,228 @@
 #include "engine/editing/painting.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <iterator>
-#include <limits>
-#include <numeric>
-#include <utility>
+#include <numbers>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
+#include "engine/editing/culled_shape.h"
+#include "engine/editing/selection.h"
 
 namespace pointwright {
 namespace {
 
 // Samples that share one culling decision.
 constexpr std::size_t kPaintBlock = 128;
-constexpr std::size_t kLeafSegments = 8;
-// Of coordinates and distances: what culling leaves to the rounding of the exact test.
-constexpr double kSlack = 1e-12;
 
-struct Box3d {
-  Vec3d min = Vec3d::Constant(std::numeric_limits<double>::infinity());
-  Vec3d max = Vec3d::Constant(-std::numeric_limits<double>::infinity());
-
-  void extend(const Vec3d& point) {
-    min = min.cwiseMin(point);
-    max = max.cwiseMax(point);
-  }
-};
-
-Box3d model_box(const Points& position, const Vec3d& origin, std::size_t begin, std::size_t end) {
+Box3d model_box(const PaintSurface& surface, std::size_t begin, std::size_t end) {
   Box3f box;
-  for (std::size_t i = begin; i < end; ++i) box.extend(position[i]);
-  return {origin + box.min.cast<double>(), origin + box.max.cast<double>()};
+  for (std::size_t i = begin; i < end; ++i) box.extend(surface.position[i]);
+  return {surface.origin + box.min.cast<double>(), surface.origin + box.max.cast<double>()};
 }
 
-bool overlap(const Box3d& a, const Box3d& b) {
-  return (a.min.array() <= b.max.array()).all() && (a.max.array() >= b.min.array()).all();
-}
-
-// Wider by `reach` and a little more: the exact test rounds too.
-Box3d widened(const Box3d& box, double reach) {
-  const Vec3d margin =
-      (Vec3d::Constant(reach) + (box.min.cwiseAbs() + box.max.cwiseAbs()) * kSlack) * (1.0 + kSlack);
-  return {box.min - margin, box.max + margin};
-}
-
-// The segments of a stroke in a hierarchy of bounding boxes, split at the median of the longest axis.
-class SegmentTree {
+// Which samples an operation's shape covers, block by block.
+class ShapeCover {
  public:
-  explicit SegmentTree(const Stroke& stroke) : stroke_(&stroke) {
-    std::vector<std::uint32_t> segments(std::max<std::size_t>(stroke.vertices.size(), 2) - 1);
-    std::iota(segments.begin(), segments.end(), 0U);
-    nodes_.reserve(2 * (segments.size() / (kLeafSegments / 2) + 1));
-    order_ = std::move(segments);
-    split(0, order_.size());
-  }
+  ShapeCover(const PaintOperation& operation, const PaintSurface& surface)
+      : surface_(surface), facing_(operation.facing), shape_(operation.shape) {}
 
-  // Fills `found` with the segments within the stroke's radius of the box's bounding sphere. Never leaves one
-  // out that holds a point of the box.
-  void within_reach(const Box3d& box, std::vector<std::uint32_t>& found) const {
-    found.clear();
-    const Box3d wide = widened(box, stroke_->radius);
-    std::array<std::uint32_t, 64> open{};  // the tree is balanced: at most one entry a level
-    std::size_t depth = 0;
-    open[depth++] = 0;
-    while (depth > 0) {
-      const std::uint32_t at = open[--depth];
-      const Node& node = nodes_[at];
-      if (!overlap(wide, widened(node.box, 0.0))) continue;
-      if (node.right != 0) {
-        open[depth++] = node.right;
-        open[depth++] = at + 1;
+  // Writes covered[0, end - begin). Stops early where cancelled.
+  void cover(std::size_t begin, std::size_t end, std::uint8_t* covered,
+             const ExecutionContext* context) const {
+    std::vector<std::uint32_t> of_range;
+    std::vector<std::uint32_t> of_block;
+    const bool range_reached = shape_.may_cover(model_box(surface_, begin, end), of_range);
+    for (std::size_t block = begin; block < end; block += kPaintBlock) {
+      if (context != nullptr && context->is_cancelled()) return;
+      const std::size_t block_end = std::min(block + kPaintBlock, end);
+      if (!range_reached || !shape_.may_cover(model_box(surface_, block, block_end), of_range, of_block))
         continue;
-      }
-      for (std::uint32_t i = node.begin; i < node.end; ++i) {
-        if (reaches(order_[i], box)) found.push_back(order_[i]);
-      }
+      for (std::size_t i = block; i < block_end; ++i)
+        covered[i - begin] = faces(i) && shape_.covers(place(i), of_block) ? 1 : 0;
     }
-  }
-
-  [[nodiscard]] bool reaches(std::uint32_t segment, const Box3d& box) const {
-    const Vec3d center = 0.5 * (box.min + box.max);
-    const double reach = stroke_->radius + 0.5 * (box.max - box.min).norm();
-    const double size = largest(box.min) + largest(box.max) + largest(first_end(segment)) +
-                        largest(second_end(segment)) + stroke_->radius;
-    return std::sqrt(stroke_segment_distance_sq(*stroke_, segment, center)) <= reach + size * kSlack;
   }
 
  private:
-  struct Node {
-    Box3d box;
-    std::uint32_t begin = 0;
-    std::uint32_t end = 0;
-    std::uint32_t right = 0;  // second child, the first follows its parent; 0 in a leaf
-  };
-
-  static double largest(const Vec3d& v) { return v.cwiseAbs().maxCoeff(); }
-
-  [[nodiscard]] const Vec3d& first_end(std::size_t segment) const { return stroke_->vertices[segment]; }
-  [[nodiscard]] const Vec3d& second_end(std::size_t segment) const {
-    return stroke_->vertices[std::min(segment + 1, stroke_->vertices.size() - 1)];
+  [[nodiscard]] bool faces(std::size_t i) const {
+    return !facing_ || surface_.normal[i].cast<double>().dot(*facing_) > 0.0;
+  }
+  [[nodiscard]] Vec3d place(std::size_t i) const {
+    return surface_.origin + surface_.position[i].cast<double>();
   }
 
-  void split(std::size_t begin, std::size_t end) {
-    const std::size_t at = nodes_.size();
-    Node node{.begin = static_cast<std::uint32_t>(begin), .end = static_cast<std::uint32_t>(end)};
-    Box3d middles;
-    for (std::size_t i = begin; i < end; ++i) {
-      node.box.extend(first_end(order_[i]));
-      node.box.extend(second_end(order_[i]));
-      middles.extend(first_end(order_[i]) + second_end(order_[i]));
-    }
-    nodes_.push_back(node);
-    if (end - begin <= kLeafSegments) return;
-    Eigen::Index axis = 0;
-    (middles.max - middles.min).maxCoeff(&axis);
-    const std::size_t half = begin + (end - begin) / 2;
-    const auto place = [&](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(place(begin), place(half), place(end), [&](std::uint32_t a, std::uint32_t b) {
-      return first_end(a)[axis] + second_end(a)[axis] < first_end(b)[axis] + second_end(b)[axis];
-    });
-    split(begin, half);
-    nodes_[at].right = static_cast<std::uint32_t>(nodes_.size());
-    split(half, end);
-  }
-
-  const Stroke* stroke_;
-  std::vector<std::uint32_t> order_;  // segments, leaf by leaf
-  std::vector<Node> nodes_;           // parents before children
+  const PaintSurface& surface_;
+  const std::optional<Vec3d>& facing_;
+  CulledShape shape_;
 };
 
-// A shape with a cheap, never optimistic answer to "may this box hold a point of the shape?". For strokes the
-// answer is the list of segments that may: within a small block of samples few of thousands do.
-class CulledShape {
- public:
-  explicit CulledShape(const Shape& shape) : shape_(&shape), stroke_(std::get_if<Stroke>(&shape)) {
-    if (stroke_ != nullptr) tree_.emplace(*stroke_);
-  }
-
-  // Whether the box may hold a point of the shape; `segments` are those of a stroke that may reach it.
-  bool may_cover(const Box3d& box, std::vector<std::uint32_t>& segments) const {
-    if (!tree_) return may_cover(box);
-    tree_->within_reach(box, segments);
-    return !segments.empty();
-  }
-  // The same for a box inside one whose answer was `from`.
-  bool may_cover(const Box3d& box, const std::vector<std::uint32_t>& from,
-                 std::vector<std::uint32_t>& segments) const {
-    if (!tree_) return may_cover(box);
-    segments.clear();
-    std::ranges::copy_if(from, std::back_inserter(segments),
-                         [&](std::uint32_t i) { return tree_->reaches(i, box); });
-    return !segments.empty();
-  }
-
-  [[nodiscard]] bool covers(const Vec3d& point, const std::vector<std::uint32_t>& segments) const {
-    if (stroke_ == nullptr) return contains(*shape_, point);
-    return std::any_of(segments.begin(), segments.end(),
-                       [&](std::uint32_t i) { return stroke_segment_contains(*stroke_, i, point); });
-  }
-
- private:
-  [[nodiscard]] bool may_cover(const Box3d& box) const {
-    if (const auto* sphere = std::get_if<Sphere>(shape_)) {
-      return overlap(box, widened({sphere->center, sphere->center}, sphere->radius));
-    }
-    if (const auto* axis_box = std::get_if<AxisBox>(shape_)) {
-      return overlap(box, {axis_box->min, axis_box->max});
-    }
-    return true;
-  }
-
-  const Shape* shape_;
-  const Stroke* stroke_;
-  std::optional<SegmentTree> tree_;
+// What becomes of a sample, whether the operation covers it or not.
+enum class Change { kStays, kJoins, kLeaves, kSwaps };
+struct Changes {
+  Change covered = Change::kStays;
+  Change uncovered = Change::kStays;
 };
 
-// The mark of one sample after the operation.
-std::uint8_t painted(std::uint8_t mark, bool covered, PaintMode mode, std::uint8_t own, std::uint8_t other,
-                     bool steal) {
-  const auto joined = static_cast<std::uint8_t>((mark | own) & (steal ? ~other : 0xff));
-  const auto left = static_cast<std::uint8_t>(mark & ~own);
+Changes changes_of(PaintMode mode) {
   switch (mode) {
     case PaintMode::kAdd:
-      return covered ? joined : mark;
+    case PaintMode::kGrow:
+    case PaintMode::kFlood:
+      return {.covered = Change::kJoins};
     case PaintMode::kRemove:
-      return covered ? left : mark;
+    case PaintMode::kShrink:
+      return {.covered = Change::kLeaves};
     case PaintMode::kIntersect:
-      return covered ? mark : left;
+      return {.uncovered = Change::kLeaves};
     case PaintMode::kSet:
-      return covered ? joined : left;
-  }
-  return mark;
-}
-
-}  // namespace
-
-Result<void> validate(const PaintOperation& operation) {
-  if (auto shape = validate(operation.shape); !shape) return shape;
-  if (!operation.facing) return {};
-  if (!operation.facing->allFinite()) {
-    return Error{.code = ErrorCode::kNonFinite, .message = "the direction must be finite", .field = "facing"};
-  }
-  if (operation.facing->cwiseAbs().maxCoeff() < kMinDirectionLength) {
-    return Error{
-        .code = ErrorCode::kInvalidArgument, .message = "the direction must not be zero", .field = "facing"};
+      return {.covered = Change::kJoins, .uncovered = Change::kLeaves};
+    case PaintMode::kInvert:
+      return {.covered = Change::kSwaps, .uncovered = Change::kSwaps};
+    case PaintMode::kClear:
+      return {.covered = Change::kLeaves, .uncovered = Change::kLeaves};
   }
   return {};
 }
 
-std::size_t paint(const PaintOperation& operation, RegionKind kind, const Points& position,
-                  const Points& normal, const Vec3d& origin, Marks& marks, const ExecutionContext* context) {
-  const std::size_t n = position.size();
+std::uint8_t changed_mark(std::uint8_t mark, Change change, std::uint8_t own, std::uint8_t other,
+                          bool steal) {
+  if (change == Change::kSwaps) change = (mark & own) != 0 ? Change::kLeaves : Change::kJoins;
+  switch (change) {
+    case Change::kJoins:
+      return static_cast<std::uint8_t>((mark | own) & (steal ? ~other : 0xff));
+    case Change::kLeaves:
+      return static_cast<std::uint8_t>(mark & ~own);
+    case Change::kStays:
+    case Change::kSwaps:
+      break;
+  }
+  return mark;
+}
+
+SampleMask marked(const Marks& marks, std::uint8_t bit) {
+  SampleMask mask(marks.size());
+  std::ranges::transform(marks, mask.begin(), [bit](std::uint8_t mark) { return (mark & bit) != 0 ? 1 : 0; });
+  return mask;
+}
+
+// The samples that growing takes in, or that shrinking gives up.
+SampleMask at_border(const PaintOperation& operation, std::uint8_t own, const Points& position,
+                     const Marks& marks, const ExecutionContext* context) {
+  SampleMask side = marked(marks, own);
+  if (operation.mode == PaintMode::kShrink) {
+    for (std::uint8_t& member : side) member ^= 1U;
+  }
+  return near_members(position, side, operation.distance, context);
+}
+
+Error distance_error(ErrorCode code, const char* message, double limit, double actual) {
+  Error error{.code = code, .message = message, .field = "distance"};
+  if (code != ErrorCode::kNonFinite) {
+    error.limit = limit;
+    error.actual = actual;
+  }
+  return error;
+}
+
+Result<void> check_distance(double distance) {
+  if (!std::isfinite(distance))
+    return distance_error(ErrorCode::kNonFinite, "the distance must be finite", 0.0, 0.0);
+  if (distance <= 0.0) {
+    return distance_error(ErrorCode::kInvalidArgument, "the distance must be greater than 0", 0.0, distance);
+  }
+  if (distance > kMaxShapeCoordinate) {
+    return distance_error(ErrorCode::kOutOfRange, "the distance must be at most 1e12", kMaxShapeCoordinate,
+                          distance);
+  }
+  return {};
+}
+
+Result<void> check_flood(const FloodFill& flood) {
+  if (auto seed = validate(Sphere{.center = flood.seed, .radius = flood.radius.value_or(1.0)}); !seed) {
+    Error error = seed.error();
+    error.field = error.field == "shape.radius" ? "radius" : "seed";
+    return error;
+  }
+  if (!flood.angle_rad) return {};
+  if (!std::isfinite(*flood.angle_rad))
+    return Error{.code = ErrorCode::kNonFinite, .message = "the angle must be finite", .field = "angle"};
+  if (*flood.angle_rad < 0.0 || *flood.angle_rad > std::numbers::pi) {
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "the angle must lie between 0 and 180 degrees",
+                 .field = "angle",
+                 .limit = *flood.angle_rad < 0.0 ? 0.0 : std::numbers::pi,
+                 .actual = *flood.angle_rad};
+  }
+  return {};
+}
+
+Result<void> check_facing(const PaintOperation& operation) {
+  const auto refused = [](ErrorCode code, const char* message) {
+    return Error{.code = code, .message = message, .field = "facing"};
+  };
+  if (!operation.facing) return {};
+  if (!has_shape(operation.mode))
+    return refused(ErrorCode::kInvalidArgument, "only modes with a shape have a direction");
+  if (!operation.facing->allFinite()) return refused(ErrorCode::kNonFinite, "the direction must be finite");
+  if (operation.facing->cwiseAbs().maxCoeff() < kMinDirectionLength)
+    return refused(ErrorCode::kInvalidArgument, "the direction must not be zero");
+  return {};
+}
+
+}  // namespace
+
+bool has_shape(PaintMode mode) {
+  return mode == PaintMode::kAdd || mode == PaintMode::kRemove || mode == PaintMode::kIntersect ||
+         mode == PaintMode::kSet;
+}
+
+bool has_distance(PaintMode mode) {
+  return mode == PaintMode::kGrow || mode == PaintMode::kShrink;
+}
+
+Result<void> validate(const PaintOperation& operation) {
+  if (has_shape(operation.mode)) {
+    if (auto shape = validate(operation.shape); !shape) return shape;
+  }
+  if (has_distance(operation.mode)) {
+    if (auto distance = check_distance(operation.distance); !distance) return distance;
+  }
+  if (operation.mode == PaintMode::kFlood) {
+    if (auto flood = check_flood(operation.flood); !flood) return flood;
+  }
+  return check_facing(operation);
+}
+
+std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface, Marks& marks,
+                  const ExecutionContext* context) {
+  const std::size_t n = surface.position.size();
   POINTWRIGHT_CHECK(marks.size() == n, "one mark per sample");
-  POINTWRIGHT_CHECK(!operation.facing || normal.size() == n, "one normal per sample");
+  POINTWRIGHT_CHECK(!operation.facing || surface.normal.size() == n, "one normal per sample");
   const auto own = static_cast<std::uint8_t>(kind);
   const auto other =
       static_cast<std::uint8_t>(kind == RegionKind::kZero ? RegionKind::kOne : RegionKind::kZero);
-  const CulledShape shape(operation.shape);
+  const Changes changes = changes_of(operation.mode);
+  SampleMask chosen;
+  if (has_distance(operation.mode)) chosen = at_border(operation, own, surface.position, marks, context);
+  if (operation.mode == PaintMode::kFlood) {
+    POINTWRIGHT_CHECK(surface.graph != nullptr && surface.graph->count == n, "the graph of the samples");
+    SampleMask blocked;
+    if (operation.flood.stop_at_other) blocked = marked(marks, other);
+    chosen = flood_fill(surface, operation.flood, blocked, context);
+  }
+  std::optional<ShapeCover> shape;
+  if (has_shape(operation.mode)) shape.emplace(operation, surface);
 
   return parallel_sum<std::size_t>(n, 0, [&](std::size_t begin, std::size_t end) {
     std::size_t changed = 0;
+    SampleMask covered(end - begin, 0);
+    if (!chosen.empty())
+      std::copy_n(chosen.begin() + static_cast<std::ptrdiff_t>(begin), end - begin, covered.begin());
+    if (shape) shape->cover(begin, end, covered.data(), context);
     if (context != nullptr && context->is_cancelled()) return changed;
-    std::vector<std::uint32_t> of_range;
-    std::vector<std::uint32_t> of_block;
-    const bool range_reached = shape.may_cover(model_box(position, origin, begin, end), of_range);
-    bool reached = false;
     for (std::size_t i = begin; i < end; ++i) {
-      if ((i - begin) % kPaintBlock == 0) {
-        if (context != nullptr && context->is_cancelled()) return changed;
-        const Box3d box = model_box(position, origin, i, std::min(i + kPaintBlock, end));
-        reached = range_reached && shape.may_cover(box, of_range, of_block);
-      }
-      bool covered = reached && (!operation.facing || normal[i].cast<double>().dot(*operation.facing) > 0.0);
-      covered = covered && shape.covers(origin + position[i].cast<double>(), of_block);
-      const std::uint8_t mark = painted(marks[i], covered, operation.mode, own, other, operation.steal);
+      const Change change = covered[i - begin] != 0 ? changes.covered : changes.uncovered;
+      const std::uint8_t mark = changed_mark(marks[i], change, own, other, operation.steal);
       changed += mark != marks[i] ? 1 : 0;
       marks[i] = mark;
     }

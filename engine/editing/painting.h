@@ -9,6 +9,7 @@
 #include "engine/core/points.h"
 #include "engine/core/result.h"
 #include "engine/editing/shape.h"
+#include "engine/spatial/neighbor_graph.h"
 
 namespace pointwright {
 
@@ -23,33 +24,63 @@ enum class PaintMode {
   kRemove,     ///< samples in the shape leave it
   kIntersect,  ///< samples outside the shape leave it
   kSet,        ///< exactly the samples in the shape
+  kInvert,     ///< members leave, all others join
+  kClear,      ///< all leave
+  kGrow,       ///< samples within `distance` of a member join
+  kShrink,     ///< members within `distance` of a sample that is none leave
+  kFlood,      ///< samples that `flood` reaches join
 };
+
+/// Fills the surface from the sample nearest to the seed, over neighbours; any combination of bounds.
+struct FloodFill {
+  Vec3d seed = Vec3d::Zero();
+  std::optional<double> angle_rad;  ///< not across a greater angle between the normals of neighbours
+  std::optional<double> radius;     ///< only within this distance of the seed
+  bool stop_at_other = false;       ///< not onto samples of the other region
+};
+
+/// Whether the mode paints with a shape.
+bool has_shape(PaintMode mode);
+/// Whether the mode reads `distance`.
+bool has_distance(PaintMode mode);
 
 struct PaintOperation {
   PaintMode mode = PaintMode::kAdd;
-  Shape shape;
+  Shape shape = Everything{};  ///< of the modes that have one
   /// Only samples whose normal has a positive component along this direction (toward the viewer): a brush
-  /// that does not paint through thin sheets. Off where not given.
+  /// that does not paint through thin sheets. Off where not given; only modes with a shape have it.
   std::optional<Vec3d> facing;
   /// Samples that join this region leave the other one. Without it they end up in both, which an edit
   /// refuses.
   bool steal = false;
+  double distance = 0.0;  ///< of kGrow and kShrink, model units
+  FloodFill flood = {};   ///< of kFlood
 };
 
-/// Errors: those of the shape; kInvalidArgument for a zero `facing`.
+/// Errors: those of the shape; kInvalidArgument for a zero `facing`, for one without a shape (field "facing")
+/// and for a distance that is not greater than 0 (field "distance"); kNonFinite, kOutOfRange; the fields of a
+/// flood are "seed", "angle" and "radius".
 Result<void> validate(const PaintOperation& operation);
 
+/// The surface that is painted: its columns belong to the caller.
+struct PaintSurface {
+  const Points& position;  ///< relative to `origin`
+  const Points& normal;    ///< read only for `facing` and for angles
+  const Vec3d& origin;
+  const NeighborGraph* graph = nullptr;  ///< of its samples; read only for kFlood
+};
+
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
-/// Shapes:      positions relative to `origin`; normals of the same surface (read only for `facing`)
-/// Cost:        O(N), parallel over samples. A stroke of V vertices adds O(V log V) to sort its segments
-///              once, O(log V) for each range of kParallelBlock samples, and a test of each of a block's 128
-///              samples against the segments within the radius of that block. Long segments whose bounding
-///              boxes hold all samples are each tested once a range; where all of them pass through all
-///              blocks it is O(N V)
+/// Pre:         validate(operation)
+/// Cost:        O(N), parallel over samples. A stroke or point set of V vertices adds O(V log V) to sort its
+///              segments once, O(log V) for each range of kParallelBlock samples, and a test of each of a
+///              block's 128 samples against the segments within the radius of that block. Long segments whose
+///              bounding boxes hold all samples are each tested once a range; where all of them pass through
+///              all blocks it is O(N V). Growing and shrinking: near_members(),
+///              filling: flood_fill()
 /// Determinism: bitwise equal for any thread count
 /// Cancels:     between blocks of samples; the marks are then incomplete and must be dropped
-std::size_t paint(const PaintOperation& operation, RegionKind kind, const Points& position,
-                  const Points& normal, const Vec3d& origin, Marks& marks,
+std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface, Marks& marks,
                   const ExecutionContext* context = nullptr);
 
 /// Samples painted with `kind`. Cost: O(N).

@@ -21,22 +21,21 @@ Result<void> check_point(const Vec3d& point, const char* field) {
   return {};
 }
 
-Result<void> check_radius(double radius) {
+Result<void> check_radius(double radius, const char* field = "shape.radius") {
   if (!std::isfinite(radius)) {
-    return Error{
-        .code = ErrorCode::kNonFinite, .message = "the radius must be finite", .field = "shape.radius"};
+    return Error{.code = ErrorCode::kNonFinite, .message = "the radius must be finite", .field = field};
   }
   if (radius <= 0.0) {
     return Error{.code = ErrorCode::kInvalidArgument,
                  .message = "the radius must be greater than 0",
-                 .field = "shape.radius",
+                 .field = field,
                  .limit = 0.0,
                  .actual = radius};
   }
   if (radius > kMaxShapeCoordinate) {
     return Error{.code = ErrorCode::kOutOfRange,
                  .message = "the radius must be at most 1e12",
-                 .field = "shape.radius",
+                 .field = field,
                  .limit = kMaxShapeCoordinate,
                  .actual = radius};
   }
@@ -48,26 +47,48 @@ Result<void> validate_one(const Sphere& sphere) {
   return check_radius(sphere.radius);
 }
 
-Result<void> validate_one(const Stroke& stroke) {
-  const auto count = static_cast<double>(stroke.vertices.size());
-  if (stroke.vertices.empty()) {
+// Of strokes and point sets: at least one vertex, not too many, all good.
+Result<void> check_vertices(const std::vector<Vec3d>& vertices, const char* field) {
+  const auto count = static_cast<double>(vertices.size());
+  if (vertices.empty()) {
     return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "a stroke needs at least one vertex",
-                 .field = "shape.vertices",
+                 .message = "at least one is needed",
+                 .field = field,
                  .limit = 1.0,
                  .actual = count};
   }
-  if (stroke.vertices.size() > kMaxStrokeVertices) {
+  if (vertices.size() > kMaxStrokeVertices) {
     return Error{.code = ErrorCode::kTooLarge,
-                 .message = "a stroke has at most 100,000 vertices",
-                 .field = "shape.vertices",
+                 .message = "at most 100,000 are allowed",
+                 .field = field,
                  .limit = static_cast<double>(kMaxStrokeVertices),
                  .actual = count};
   }
-  for (const Vec3d& vertex : stroke.vertices) {
-    if (auto point = check_point(vertex, "shape.vertices"); !point) return point;
+  for (const Vec3d& vertex : vertices) {
+    if (auto point = check_point(vertex, field); !point) return point;
   }
+  return {};
+}
+
+Result<void> validate_one(const Stroke& stroke) {
+  if (auto vertices = check_vertices(stroke.vertices, "shape.vertices"); !vertices) return vertices;
   return check_radius(stroke.radius);
+}
+
+Result<void> validate_one(const PointSet& set) {
+  if (auto points = check_vertices(set.points, "shape.points"); !points) return points;
+  if (set.radii.size() != 1 && set.radii.size() != set.points.size()) {
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "there must be one radius for each point",
+                 .field = "shape.radii",
+                 .limit = static_cast<double>(set.points.size()),
+                 .actual = static_cast<double>(set.radii.size())};
+  }
+  for (const double radius : set.radii) {
+    if (auto checked = check_radius(radius, set.radii.size() == 1 ? "shape.radius" : "shape.radii"); !checked)
+      return checked;
+  }
+  return {};
 }
 
 Result<void> validate_one(const AxisBox& box) {
@@ -96,14 +117,28 @@ Result<void> validate_one(const Everything&) {
   return {};
 }
 
+Result<void> validate_one(const ScreenShape& shape) {
+  return validate_screen_shape(shape);
+}
+
 bool contains_one(const Sphere& sphere, const Vec3d& point) {
   return (point - sphere.center).squaredNorm() <= sphere.radius * sphere.radius;
 }
 
 bool contains_one(const Stroke& stroke, const Vec3d& point) {
+  const double radius_sq = stroke.radius * stroke.radius;
   const std::size_t segments = std::max<std::size_t>(stroke.vertices.size(), 2) - 1;
   for (std::size_t i = 0; i < segments && !stroke.vertices.empty(); ++i) {
-    if (stroke_segment_contains(stroke, i, point)) return true;
+    const Vec3d& next = stroke.vertices[std::min(i + 1, stroke.vertices.size() - 1)];
+    if (segment_distance_sq(stroke.vertices[i], next, point) <= radius_sq) return true;
+  }
+  return false;
+}
+
+bool contains_one(const PointSet& set, const Vec3d& point) {
+  for (std::size_t i = 0; i < set.points.size(); ++i) {
+    const double radius = set.radii.size() == 1 ? set.radii.front() : set.radii[i];
+    if ((point - set.points[i]).squaredNorm() <= radius * radius) return true;
   }
   return false;
 }
@@ -120,6 +155,11 @@ bool contains_one(const Everything&, const Vec3d&) {
   return true;
 }
 
+bool contains_one(const ScreenShape& shape, const Vec3d& point) {
+  const std::optional<Vec2d> place = project(shape, point);
+  return place && outline_contains(shape, *place);
+}
+
 }  // namespace
 
 Result<void> validate(const Shape& shape) {
@@ -130,19 +170,20 @@ bool contains(const Shape& shape, const Vec3d& point) {
   return std::visit([&](const auto& one) { return contains_one(one, point); }, shape);
 }
 
-double stroke_segment_distance_sq(const Stroke& stroke, std::size_t segment, const Vec3d& point) {
-  const Vec3d& a = stroke.vertices[segment];
-  const Vec3d& b = stroke.vertices[std::min(segment + 1, stroke.vertices.size() - 1)];
+std::size_t vertex_count(const Shape& shape) {
+  if (const auto* stroke = std::get_if<Stroke>(&shape)) return stroke->vertices.size();
+  if (const auto* set = std::get_if<PointSet>(&shape)) return set->points.size();
+  if (const auto* screen = std::get_if<ScreenShape>(&shape)) return outline_vertex_count(*screen);
+  return 0;
+}
+
+double segment_distance_sq(const Vec3d& a, const Vec3d& b, const Vec3d& point) {
   const Vec3d along = b - a;
   const Vec3d to_point = point - a;
   const double length_sq = along.squaredNorm();
   // A segment without length is the ball around its vertex.
   const double s = length_sq > 0.0 ? std::clamp(to_point.dot(along) / length_sq, 0.0, 1.0) : 0.0;
   return (to_point - s * along).squaredNorm();
-}
-
-bool stroke_segment_contains(const Stroke& stroke, std::size_t segment, const Vec3d& point) {
-  return stroke_segment_distance_sq(stroke, segment, point) <= stroke.radius * stroke.radius;
 }
 
 }  // namespace pointwright

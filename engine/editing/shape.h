@@ -8,6 +8,7 @@
 
 #include "engine/core/result.h"
 #include "engine/core/vector.h"
+#include "engine/editing/screen_shape.h"
 
 namespace pointwright {
 
@@ -27,6 +28,11 @@ struct Stroke {
   std::vector<Vec3d> vertices;  ///< at least 1
   double radius = 0.0;
 };
+/// A union of balls: all points within the radius of any of the points.
+struct PointSet {
+  std::vector<Vec3d> points;  ///< at least 1
+  std::vector<double> radii;  ///< one for all points, or one for each
+};
 /// An axis-aligned box, borders included.
 struct AxisBox {
   Vec3d min = Vec3d::Zero();
@@ -40,22 +46,22 @@ struct HalfSpace {
 /// All of space.
 struct Everything {};
 
-using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything>;
+using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything, PointSet, ScreenShape>;
 
 /// Finite members within kMaxShapeCoordinate, radii > 0, min <= max, a normal that is not zero, at least one
-/// and at most kMaxStrokeVertices vertices.
+/// and at most kMaxStrokeVertices vertices or points.
 /// Errors: kInvalidArgument (field "shape.radius" and the like), kNonFinite, kOutOfRange, kTooLarge.
 Result<void> validate(const Shape& shape);
 
-/// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for a stroke.
+/// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for strokes, point
+/// sets and outlines.
 bool contains(const Shape& shape, const Vec3d& point);
 
-/// Squared distance from the point to the segment `segment` of the stroke, numbered as below.
-double stroke_segment_distance_sq(const Stroke& stroke, std::size_t segment, const Vec3d& point);
+/// Vertices that the shape counts with against the limit of a painting: those of strokes, point sets and
+/// outlines.
+std::size_t vertex_count(const Shape& shape);
 
-/// Whether the point lies within the stroke's radius of its segment `segment` (from that vertex to the next;
-/// a stroke of one vertex has one segment, the vertex itself). A stroke contains what any of its segments
-/// contains.
-bool stroke_segment_contains(const Stroke& stroke, std::size_t segment, const Vec3d& point);
+/// Squared distance from the point to the segment from a to b, which may be one point.
+double segment_distance_sq(const Vec3d& a, const Vec3d& b, const Vec3d& point);
 
 }  // namespace pointwright

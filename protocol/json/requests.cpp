@@ -7,101 +7,17 @@
 
 #include "engine/multires/reconstruction.h"
 #include "protocol/frames/frame.h"
-#include "protocol/json/reader.h"
+#include "protocol/json/request_members.h"
 
 namespace pointwright::protocol {
 namespace {
 
-/// Strokes and the like are checked by the engine too; this only bounds what is copied out of the document.
-constexpr std::size_t kMaxVertices = 100'000;
-
-constexpr std::array<std::string_view, 5> kShapeNames{"sphere", "stroke", "box", "half_space", "all"};
-constexpr std::array<std::string_view, 4> kPaintModeNames{"add", "remove", "intersect", "set"};
 // In the order of ElementaryDeformation; a composition of several comes last.
 constexpr std::array<std::string_view, 7> kDeformationNames{
     "translation", "along_normal", "toward_point", "rotation", "scale", "twist", "sequence"};
 constexpr std::size_t kSequence = kDeformationNames.size() - 1;
 static_assert(std::variant_size_v<ElementaryDeformation> == kSequence);
 constexpr std::array<std::string_view, 4> kBlendNames{"quartic", "cubic", "quintic", "cosine"};
-
-Vec3d required_vec3(ObjectReader& object, std::string_view name) {
-  const Json* const member = object.required(name);
-  if (member == nullptr) return Vec3d::Zero();
-  return read_vec3(*member, object.pointer_to(name), object.errors()).value_or(Vec3d::Zero());
-}
-
-double required_number(ObjectReader& object, std::string_view name) {
-  const Json* const member = object.required(name);
-  if (member == nullptr) return 0.0;
-  return read_number(*member, object.pointer_to(name), object.errors()).value_or(0.0);
-}
-
-std::optional<std::size_t> required_choice(ObjectReader& object, std::string_view name,
-                                           std::span<const std::string_view> names) {
-  const Json* const member = object.required(name);
-  if (member == nullptr) return std::nullopt;
-  return read_choice(*member, object.pointer_to(name), object.errors(), names);
-}
-
-Stroke read_stroke(ObjectReader& object) {
-  Stroke stroke;
-  if (const Json* const vertices = object.required("vertices")) {
-    const std::string pointer = object.pointer_to("vertices");
-    if (const Json* const array = read_array(*vertices, pointer, object.errors(), 1, kMaxVertices)) {
-      stroke.vertices.reserve(array->size());
-      for (std::size_t i = 0; i < array->size(); ++i) {
-        const auto vertex = read_vec3((*array)[i], child_pointer(pointer, i), object.errors());
-        stroke.vertices.push_back(vertex.value_or(Vec3d::Zero()));
-      }
-    }
-  }
-  stroke.radius = required_number(object, "radius");
-  return stroke;
-}
-
-Shape read_shape(const Json& value, const std::string& pointer, JsonErrors& errors) {
-  ObjectReader object(value, pointer, errors);
-  const auto type = required_choice(object, "type", kShapeNames);
-  if (!type) return Everything{};  // what members it may have is unknown then
-  Shape shape = Everything{};
-  if (kShapeNames[*type] == "sphere") {
-    shape = Sphere{.center = required_vec3(object, "center"), .radius = required_number(object, "radius")};
-  } else if (kShapeNames[*type] == "stroke") {
-    shape = read_stroke(object);
-  } else if (kShapeNames[*type] == "box") {
-    shape = AxisBox{.min = required_vec3(object, "min"), .max = required_vec3(object, "max")};
-  } else if (kShapeNames[*type] == "half_space") {
-    shape = HalfSpace{.point = required_vec3(object, "point"), .normal = required_vec3(object, "normal")};
-  }
-  object.finish();
-  return shape;
-}
-
-/// Adds the engine's verdict where the document itself was in order.
-void add_verdict(const Result<void>& verdict, const std::string& pointer, JsonErrors& errors) {
-  if (!verdict) errors.add(pointer + pointer_of_field(verdict.error().field), verdict.error().message);
-}
-
-PaintOperation read_paint_operation(const Json& value, const std::string& pointer, JsonErrors& errors) {
-  const std::size_t faults_before = errors.fault_count;
-  PaintOperation operation;
-  ObjectReader object(value, pointer, errors);
-  if (const auto mode = required_choice(object, "mode", kPaintModeNames)) {
-    operation.mode = static_cast<PaintMode>(*mode);
-  }
-  if (const Json* const shape = object.required("shape")) {
-    operation.shape = read_shape(*shape, object.pointer_to("shape"), errors);
-  }
-  if (const Json* const facing = object.optional("facing")) {
-    operation.facing = read_vec3(*facing, object.pointer_to("facing"), errors);
-  }
-  if (const Json* const steal = object.optional("steal")) {
-    operation.steal = read_bool(*steal, object.pointer_to("steal"), errors).value_or(false);
-  }
-  object.finish();
-  if (errors.fault_count == faults_before) add_verdict(validate(operation), pointer, errors);
-  return operation;
-}
 
 struct Axis {
   Vec3d point = Vec3d::Zero();
@@ -204,36 +120,7 @@ EditParams read_edit_members(ObjectReader& object) {
   return edit;
 }
 
-template <typename T>
-Parsed<T> value_or_errors(T value, JsonErrors errors) {
-  if (!errors.empty()) return errors;
-  return value;
-}
-
 }  // namespace
-
-Parsed<PaintOperation> parse_paint_operation(const Json& document) {
-  JsonErrors errors;
-  PaintOperation operation = read_paint_operation(document, "", errors);
-  return value_or_errors(std::move(operation), std::move(errors));
-}
-
-Parsed<std::vector<PaintOperation>> parse_painting(const Json& document) {
-  JsonErrors errors;
-  std::vector<PaintOperation> painting;
-  ObjectReader object(document, "", errors);
-  if (const Json* const member = object.required("operations")) {
-    const std::string pointer = object.pointer_to("operations");
-    if (const Json* const array = read_array(*member, pointer, errors, 0, kMaxPaintOperations)) {
-      painting.reserve(array->size());
-      for (std::size_t i = 0; i < array->size(); ++i) {
-        painting.push_back(read_paint_operation((*array)[i], child_pointer(pointer, i), errors));
-      }
-    }
-  }
-  object.finish();
-  return value_or_errors(std::move(painting), std::move(errors));
-}
 
 Parsed<EditParams> parse_edit(const Json& document) {
   JsonErrors errors;
@@ -303,34 +190,6 @@ Parsed<HeadRequest> parse_head(const Json& document) {
 
 JsonDocument to_json(const Vec3d& vector) {
   return JsonDocument::array({vector.x(), vector.y(), vector.z()});
-}
-
-JsonDocument to_json(const Shape& shape) {
-  JsonDocument document{{"type", kShapeNames[shape.index()]}};
-  if (const auto* sphere = std::get_if<Sphere>(&shape)) {
-    document["center"] = to_json(sphere->center);
-    document["radius"] = sphere->radius;
-  } else if (const auto* stroke = std::get_if<Stroke>(&shape)) {
-    JsonDocument vertices = JsonDocument::array();
-    for (const Vec3d& vertex : stroke->vertices) vertices.push_back(to_json(vertex));
-    document["vertices"] = std::move(vertices);
-    document["radius"] = stroke->radius;
-  } else if (const auto* box = std::get_if<AxisBox>(&shape)) {
-    document["min"] = to_json(box->min);
-    document["max"] = to_json(box->max);
-  } else if (const auto* half_space = std::get_if<HalfSpace>(&shape)) {
-    document["point"] = to_json(half_space->point);
-    document["normal"] = to_json(half_space->normal);
-  }
-  return document;
-}
-
-JsonDocument to_json(const PaintOperation& operation) {
-  JsonDocument document{{"mode", kPaintModeNames[static_cast<std::size_t>(operation.mode)]},
-                        {"shape", to_json(operation.shape)}};
-  if (operation.facing) document["facing"] = to_json(*operation.facing);
-  if (operation.steal) document["steal"] = true;
-  return document;
 }
 
 namespace {

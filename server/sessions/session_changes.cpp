@@ -20,8 +20,7 @@ protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) 
 
 std::size_t vertices_of(const std::vector<PaintOperation>& operations) {
   std::size_t count = 0;
-  for (const PaintOperation& operation : operations)
-    if (const auto* stroke = std::get_if<Stroke>(&operation.shape)) count += stroke->vertices.size();
+  for (const PaintOperation& operation : operations) count += vertex_count(operation.shape);
   return count;
 }
 
@@ -57,16 +56,19 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
   const std::size_t vertices = (append ? painting.vertices : 0) + vertices_of(operations);
   if (vertices > params_.max_painting_vertices)
     return Problem{.kind = ProblemKind::kTooManySamples,
-                   .detail = "the strokes of the region have more vertices than a painting may have",
+                   .detail = "the shapes of the region have more vertices than a painting may have",
                    .limit = static_cast<double>(params_.max_painting_vertices),
                    .actual = static_cast<double>(vertices)};
   auto marks = std::make_shared<Marks>(*before->marks);
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
   const Level& finest = before->surface.surface->finest();
+  const PaintSurface surface{.position = finest.position,
+                             .normal = finest.normal,
+                             .origin = params_.cloud->origin,
+                             .graph = rest_.graph.get()};
   for (const PaintOperation& operation : operations) {
-    pointwright::paint(operation, kind, finest.position, finest.normal, params_.cloud->origin, *marks,
-                       &context_);
+    pointwright::paint(operation, kind, surface, *marks, &context_);
     if (auto open = check_open(); !open.ok()) return open.problem();
   }
   Painted result;

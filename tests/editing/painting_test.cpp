@@ -21,9 +21,18 @@ struct Row {
   Marks marks = Marks(4, 0);
 
   std::size_t apply(const PaintOperation& operation, RegionKind kind = RegionKind::kZero) {
-    return paint(operation, kind, position, normal, Vec3d(10.0, 0.0, 0.0), marks);
+    const Vec3d origin(10.0, 0.0, 0.0);
+    return paint(operation, kind, {.position = position, .normal = normal, .origin = origin}, marks);
   }
 };
+
+// Paints samples without normals.
+std::size_t paint_shape(const Shape& shape, RegionKind kind, const Points& position, const Vec3d& origin,
+                        Marks& marks, const ExecutionContext* context = nullptr) {
+  const Points no_normals;
+  return paint({.shape = shape}, kind, {.position = position, .normal = no_normals, .origin = origin}, marks,
+               context);
+}
 
 PaintOperation from_x(double x, PaintMode mode) {
   return {.mode = mode, .shape = HalfSpace{.point = Vec3d(10.0 + x, 0.0, 0.0), .normal = Vec3d::UnitX()}};
@@ -72,6 +81,78 @@ TEST_CASE("without steal a sample ends in both regions, with it in the newer one
   CHECK(row.marks == Marks{0, 0, kOneBit, kOneBit});
 }
 
+PaintOperation of_mode(PaintMode mode, double distance = 0.0) {
+  return {.mode = mode, .distance = distance};
+}
+
+TEST_CASE("inverting swaps members and others, clearing empties the region; other regions stay") {
+  Row row;
+  row.marks = {kZeroBit, 0, kOneBit, kZeroBit | kOneBit};
+  Row thief = row;
+  CHECK(row.apply(of_mode(PaintMode::kInvert)) == 4);
+  CHECK(row.marks == Marks{0, kZeroBit, kZeroBit | kOneBit, kOneBit});
+  CHECK(row.apply(of_mode(PaintMode::kInvert)) == 4);
+  CHECK(row.marks == Marks{kZeroBit, 0, kOneBit, kZeroBit | kOneBit});
+  PaintOperation steal = of_mode(PaintMode::kInvert);
+  steal.steal = true;  // who joins leaves the other region, who leaves keeps it
+  CHECK(thief.apply(steal) == 4);
+  CHECK(thief.marks == Marks{0, kZeroBit, kZeroBit, kOneBit});
+  CHECK(row.apply(of_mode(PaintMode::kClear)) == 2);
+  CHECK(row.marks == Marks{0, 0, kOneBit, kOneBit});
+  CHECK(row.apply(of_mode(PaintMode::kClear)) == 0);
+}
+
+TEST_CASE(
+    "growing takes in what lies within the distance, shrinking gives up what lies that near to others") {
+  Row row;
+  row.marks = {kOneBit, 0, kOneBit, kZeroBit};
+  CHECK(row.apply(of_mode(PaintMode::kGrow, 0.999)) == 0);
+  Row stolen = row;
+  CHECK(row.apply(of_mode(PaintMode::kGrow, 1.0)) == 1);  // the distance itself counts
+  CHECK(row.marks == Marks{kOneBit, 0, kZeroBit | kOneBit, kZeroBit});
+  PaintOperation steal = of_mode(PaintMode::kGrow, 3.0);
+  steal.steal = true;
+  CHECK(stolen.apply(steal) == 3);
+  CHECK(stolen.marks == Marks{kZeroBit, kZeroBit, kZeroBit, kZeroBit});
+  CHECK(stolen.apply(of_mode(PaintMode::kShrink, 100.0)) == 0);  // no others to be near to
+  CHECK(row.apply(of_mode(PaintMode::kShrink, 1.5)) == 1);
+  CHECK(row.marks == Marks{kOneBit, 0, kOneBit, kZeroBit});
+  CHECK(row.apply(of_mode(PaintMode::kClear)) == 1);
+  CHECK(row.apply(of_mode(PaintMode::kGrow, 100.0)) == 0);  // no member to grow from
+}
+
+TEST_CASE("growing and shrinking are those of brute force, on any machine") {
+  const std::size_t n = 5000;
+  const Points position = test::random_points(n, 11);
+  const Points no_normals;
+  const Vec3d origin(3.0, -2.0, 1.0);
+  const PaintSurface surface{.position = position, .normal = no_normals, .origin = origin};
+  Marks before(n, 0);
+  paint({.shape = Sphere{.center = origin, .radius = 0.5}}, RegionKind::kZero, surface, before);
+  REQUIRE(count_marked(before, RegionKind::kZero) > 50);
+  for (const PaintMode mode : {PaintMode::kGrow, PaintMode::kShrink}) {
+    const double distance = 0.125;
+    const std::uint8_t side = mode == PaintMode::kGrow ? 1 : 0;
+    Marks expected = before;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (before[i] == side) continue;
+      float nearest = std::numeric_limits<float>::infinity();
+      for (std::size_t j = 0; j < n; ++j) {
+        if (before[j] == side) nearest = std::min(nearest, (position[i] - position[j]).norm());
+      }
+      if (nearest <= distance) expected[i] = side;
+    }
+    REQUIRE(expected != before);
+    test::for_all_machines(
+        [&] {
+          Marks marks = before;
+          paint(of_mode(mode, distance), RegionKind::kZero, surface, marks);
+          return marks;
+        },
+        [&](const Marks&, const Marks& marks) { CHECK(marks == expected); });
+  }
+}
+
 TEST_CASE("culling never changes what a shape covers") {
   const std::size_t n = 20'000;
   const Points position = test::random_points(n, 3);
@@ -79,8 +160,13 @@ TEST_CASE("culling never changes what a shape covers") {
   Stroke scribble{.vertices = {}, .radius = 0.05};
   const Points path = test::random_points(300, 4);
   for (std::size_t i = 0; i < path.size(); ++i) scribble.vertices.push_back(origin + path[i].cast<double>());
+  PointSet balls{.points = scribble.vertices, .radii = {}};
+  for (std::size_t i = 0; i < path.size(); ++i)
+    balls.radii.push_back(0.001 * static_cast<double>(i % 100 + 1));
   const std::vector<Shape> shapes = {
       Shape(scribble),
+      Shape(balls),
+      Shape(PointSet{.points = scribble.vertices, .radii = {0.03}}),
       Shape(Sphere{.center = origin + Vec3d(0.3, 0.2, 0.1), .radius = 0.4}),
       Shape(AxisBox{.min = origin - Vec3d(0.5, 0.1, 2.0), .max = origin + Vec3d(0.1, 0.7, 0.3)}),
       Shape(HalfSpace{.point = origin, .normal = Vec3d(1.0, -2.0, 0.5)}),
@@ -88,7 +174,7 @@ TEST_CASE("culling never changes what a shape covers") {
       Shape(Stroke{.vertices = {origin + Vec3d(5.0, 5.0, 5.0)}, .radius = 0.1})};  // misses the cloud
   for (const Shape& shape : shapes) {
     Marks marks(n, 0);
-    const std::size_t changed = paint({.shape = shape}, RegionKind::kOne, position, Points(), origin, marks);
+    const std::size_t changed = paint_shape(shape, RegionKind::kOne, position, origin, marks);
     std::size_t expected = 0;
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -101,7 +187,7 @@ TEST_CASE("culling never changes what a shape covers") {
     test::for_all_machines(
         [&] {
           Marks again(n, 0);
-          paint({.shape = shape}, RegionKind::kOne, position, Points(), origin, again);
+          paint_shape(shape, RegionKind::kOne, position, origin, again);
           return again;
         },
         [](const Marks& a, const Marks& b) { CHECK(a == b); });
@@ -118,7 +204,7 @@ TEST_CASE("a long stroke of long segments costs what lies within its radius, not
   }
   Marks marks(position.size(), 0);
   const auto begin = std::chrono::steady_clock::now();
-  CHECK(paint({.shape = zigzag}, RegionKind::kZero, position, Points(), Vec3d::Zero(), marks) == 0);
+  CHECK(paint_shape(zigzag, RegionKind::kZero, position, Vec3d::Zero(), marks) == 0);
   // Testing every segment at every sample takes 30 s.
   CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(10));
 }
@@ -137,7 +223,7 @@ TEST_CASE("culling keeps the segments that only just reach, at large coordinates
   position.resize(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) position.set(i, places[i]);
   Marks marks(places.size(), 0);
-  paint({.shape = stroke}, RegionKind::kZero, position, Points(), origin, marks);
+  paint_shape(stroke, RegionKind::kZero, position, origin, marks);
   for (std::size_t i = 0; i < places.size(); ++i) {
     REQUIRE((marks[i] != 0) == contains(stroke, origin + position[i].cast<double>()));
   }
@@ -148,14 +234,23 @@ TEST_CASE("cancelled painting stops") {
   ExecutionContext context;
   context.cancel();
   Marks marks(300, 0);
-  paint({.shape = Everything{}}, RegionKind::kZero, Points(300), Points(), Vec3d::Zero(), marks, &context);
+  paint_shape(Everything{}, RegionKind::kZero, Points(300), Vec3d::Zero(), marks, &context);
   CHECK(count_marked(marks, RegionKind::kZero) == 0);
 }
 
 TEST_CASE("painting works on any number of samples") {
   for (const std::size_t n : {0, 1, 15, 16, 17}) {
+    const Points position(n);  // all in one place
+    const Vec3d origin = Vec3d::Zero();
+    const PaintSurface surface{.position = position, .normal = position, .origin = origin};
+    Marks grown(n, 0);
+    CHECK(paint(of_mode(PaintMode::kGrow, 1e-30), RegionKind::kZero, surface, grown) == 0);
+    if (n > 0) grown[0] = kZeroBit;
+    CHECK(paint(of_mode(PaintMode::kGrow, 1e-30), RegionKind::kZero, surface, grown) == (n > 0 ? n - 1 : 0));
+    CHECK(paint(of_mode(PaintMode::kInvert), RegionKind::kZero, surface, grown) == n);
+    CHECK(paint(of_mode(PaintMode::kShrink, 1.0), RegionKind::kZero, surface, grown) == 0);
     Marks marks(n, 0);
-    CHECK(paint({.shape = Everything{}}, RegionKind::kZero, Points(n), Points(n), Vec3d::Zero(), marks) == n);
+    CHECK(paint_shape(Everything{}, RegionKind::kZero, Points(n), Vec3d::Zero(), marks) == n);
     CHECK(count_marked(marks, RegionKind::kZero) == n);
   }
 }
@@ -174,6 +269,23 @@ TEST_CASE("operations are validated") {
   const Result<void> shape = validate(PaintOperation{.shape = Sphere{.radius = -1.0}});
   REQUIRE(!shape.ok());
   CHECK(shape.error().field == "shape.radius");
+  // A shape that the mode does not paint with is not looked at; a direction without a shape is refused.
+  CHECK(validate(PaintOperation{.mode = PaintMode::kInvert, .shape = Sphere{.radius = -1.0}}).ok());
+  const Result<void> facing =
+      validate(PaintOperation{.mode = PaintMode::kGrow, .facing = Vec3d::UnitX(), .distance = 1.0});
+  REQUIRE(!facing.ok());
+  CHECK(facing.error().field == "facing");
+  const auto distance_refused = [](double distance, ErrorCode code) {
+    const Result<void> result = validate(of_mode(PaintMode::kShrink, distance));
+    REQUIRE(!result.ok());
+    CHECK(result.error().code == code);
+    CHECK(result.error().field == "distance");
+  };
+  distance_refused(0.0, ErrorCode::kInvalidArgument);
+  distance_refused(-1.0, ErrorCode::kInvalidArgument);
+  distance_refused(nan, ErrorCode::kNonFinite);
+  distance_refused(2e12, ErrorCode::kOutOfRange);
+  CHECK(validate(of_mode(PaintMode::kGrow, 1e-6)).ok());
 }
 
 }  // namespace

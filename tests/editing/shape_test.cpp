@@ -48,6 +48,21 @@ TEST_CASE("a stroke of one vertex is a sphere, of two a capsule, of more their u
   CHECK_FALSE(contains(standing, Vec3d(2.1, 1.0, 1.0)));
 }
 
+TEST_CASE("a point set is the union of its balls, with one radius for all or one for each") {
+  const std::vector<Vec3d> points = {Vec3d::Zero(), Vec3d(4.0, 0.0, 0.0)};
+  const Shape same = PointSet{.points = points, .radii = {1.0}};
+  CHECK(validate(same).ok());
+  CHECK(contains(same, Vec3d(5.0, 0.0, 0.0)));
+  CHECK_FALSE(contains(same, Vec3d(2.0, 0.0, 0.0)));
+  const Shape each = PointSet{.points = points, .radii = {0.5, 2.0}};
+  CHECK(validate(each).ok());
+  CHECK(contains(each, Vec3d(2.0, 0.0, 0.0)));
+  CHECK(contains(each, Vec3d(0.0, 0.5, 0.0)));
+  CHECK_FALSE(contains(each, Vec3d(0.0, 0.51, 0.0)));
+  CHECK(vertex_count(each) == 2);
+  CHECK(vertex_count(Everything{}) == 0);
+}
+
 TEST_CASE("boxes and half-spaces include their borders; a flat box is legal") {
   const Shape box = AxisBox{.min = Vec3d(0.0, 0.0, 0.0), .max = Vec3d(1.0, 2.0, 0.0)};
   CHECK(validate(box).ok());
@@ -78,6 +93,17 @@ TEST_CASE("shapes with members outside their range are refused by name") {
                 ErrorCode::kNonFinite, "shape.vertices");
   check_refused(Stroke{.vertices = std::vector<Vec3d>(kMaxStrokeVertices + 1, Vec3d::Zero()), .radius = 1.0},
                 ErrorCode::kTooLarge, "shape.vertices");
+  check_refused(PointSet{.points = {}, .radii = {1.0}}, ErrorCode::kInvalidArgument, "shape.points");
+  check_refused(PointSet{.points = {Vec3d(kNan, 0.0, 0.0)}, .radii = {1.0}}, ErrorCode::kNonFinite,
+                "shape.points");
+  const std::vector<Vec3d> two(2, Vec3d::Zero());
+  check_refused(PointSet{.points = two, .radii = {}}, ErrorCode::kInvalidArgument, "shape.radii");
+  check_refused(PointSet{.points = two, .radii = {1.0, 1.0, 1.0}}, ErrorCode::kInvalidArgument,
+                "shape.radii");
+  check_refused(PointSet{.points = two, .radii = {1.0, 0.0}}, ErrorCode::kInvalidArgument, "shape.radii");
+  check_refused(PointSet{.points = two, .radii = {kInf}}, ErrorCode::kNonFinite, "shape.radius");
+  check_refused(PointSet{.points = std::vector<Vec3d>(kMaxStrokeVertices + 1, Vec3d::Zero()), .radii = {1.0}},
+                ErrorCode::kTooLarge, "shape.points");
   check_refused(AxisBox{.min = Vec3d(0.0, 1.0, 0.0), .max = Vec3d(1.0, 0.0, 1.0)},
                 ErrorCode::kInvalidArgument, "shape.min");
   check_refused(AxisBox{.max = Vec3d(0.0, 0.0, kNan)}, ErrorCode::kNonFinite, "shape.max");

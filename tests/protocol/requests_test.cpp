@@ -63,7 +63,8 @@ TEST_CASE("paint operations are read with every shape and mode") {
 
 TEST_CASE("whatever is wrong with a paint operation is pointed at") {
   CHECK(refused("[]", parse_paint_operation) == Pointers{""});
-  CHECK(refused("{}", parse_paint_operation) == Pointers{"/mode", "/shape"});
+  CHECK(refused("{}", parse_paint_operation) == Pointers{"/mode"});
+  CHECK(refused(R"({"mode":"set"})", parse_paint_operation) == Pointers{"/shape"});
   CHECK(refused(R"({"mode":"blur","shape":{"type":"all"}})", parse_paint_operation) == Pointers{"/mode"});
   CHECK(refused(R"({"mode":"add","shape":{"type":"cone"}})", parse_paint_operation) ==
         Pointers{"/shape/type"});
@@ -79,6 +80,106 @@ TEST_CASE("whatever is wrong with a paint operation is pointed at") {
         Pointers{"/facing"});
   CHECK(refused(R"({"mode":"add","shape":{"type":"stroke","vertices":[],"radius":1}})",
                 parse_paint_operation) == Pointers{"/shape/vertices"});
+}
+
+TEST_CASE("operations without a shape have their own members, and no others") {
+  CHECK(accepted(R"({"mode":"invert","steal":true})", parse_paint_operation).steal);
+  CHECK(accepted(R"({"mode":"clear"})", parse_paint_operation).mode == PaintMode::kClear);
+  CHECK(accepted(R"({"mode":"grow","distance":0.5})", parse_paint_operation).distance == 0.5);
+  CHECK(refused(R"({"mode":"invert","shape":{"type":"all"},"distance":1})", parse_paint_operation) ==
+        Pointers{"/distance", "/shape"});
+  CHECK(refused(R"({"mode":"clear","facing":[0,0,1]})", parse_paint_operation) == Pointers{"/facing"});
+  CHECK(refused(R"({"mode":"add","shape":{"type":"all"},"distance":1})", parse_paint_operation) ==
+        Pointers{"/distance"});
+  CHECK(refused(R"({"mode":"grow"})", parse_paint_operation) == Pointers{"/distance"});
+  CHECK(refused(R"({"mode":"shrink","distance":"1"})", parse_paint_operation) == Pointers{"/distance"});
+  CHECK(refused(R"({"mode":"shrink","distance":0})", parse_paint_operation) == Pointers{"/distance"});
+  CHECK(refused(R"({"mode":"shrink","distance":1e13})", parse_paint_operation) == Pointers{"/distance"});
+}
+
+TEST_CASE("points have one radius or one each") {
+  const auto points = [](const std::string& members) {
+    return R"({"mode":"add","shape":{"type":"points",)" + members + "}}";
+  };
+  const auto one = accepted(points(R"("points":[[0,0,0],[1,2,3]],"radius":0.5)"), parse_paint_operation);
+  CHECK(std::get<PointSet>(one.shape).points[1] == Vec3d(1, 2, 3));
+  CHECK(std::get<PointSet>(one.shape).radii == std::vector<double>{0.5});
+  const auto each =
+      accepted(points(R"("points":[[0,0,0],[1,2,3]],"radii":[0.5,0.25])"), parse_paint_operation);
+  CHECK(std::get<PointSet>(each.shape).radii == std::vector<double>{0.5, 0.25});
+  const auto faults = [&](const std::string& members) {
+    return refused(points(members), parse_paint_operation);
+  };
+  CHECK(faults(R"("points":[[0,0,0]])") == Pointers{"/shape/radius"});
+  CHECK(faults(R"("points":[[0,0,0]],"radius":1,"radii":[1])") == Pointers{"/shape/radius"});
+  CHECK(faults(R"("points":[[0,0,0]],"radii":[1,2])") == Pointers{"/shape/radii"});
+  CHECK(faults(R"("points":[[0,0,0]],"radii":[true])") == Pointers{"/shape/radii/0"});
+  CHECK(faults(R"("points":[[0,0,0]],"radii":[-1])") == Pointers{"/shape/radius"});
+  CHECK(faults(R"("points":[[0,0,0],[0,0,0]],"radii":[1,-1])") == Pointers{"/shape/radii"});
+  CHECK(faults(R"("points":[],"radius":1)") == Pointers{"/shape/points"});
+  CHECK(faults(R"("points":[[0,0]],"radius":1)") == Pointers{"/shape/points/0"});
+}
+
+TEST_CASE("screen shapes have a view of 16 numbers and one outline") {
+  const std::string view = R"("view":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,-1,5])";
+  const auto faults = [](const std::string& members) {
+    return refused(R"({"mode":"add","shape":{"type":"screen",)" + members + "}}", parse_paint_operation);
+  };
+  const auto with = [&](const std::string& outline) { return faults(view + R"(,"outline":)" + outline); };
+  const auto read =
+      accepted(R"({"mode":"set","shape":{"type":"screen",)" + view +
+                   R"(,"outline":{"type":"polyline","vertices":[[0,0.5],[1,2]],"width":0.25}}})",
+               parse_paint_operation);
+  const auto& screen = std::get<ScreenShape>(read.shape);
+  CHECK(screen.view[14] == -1.0);
+  CHECK(screen.view[15] == 5.0);
+  CHECK(std::get<ScreenPolyline>(screen.outline).vertices[1] == Vec2d(1, 2));
+  CHECK(std::get<ScreenPolyline>(screen.outline).width == 0.25);
+  CHECK(faults(view) == Pointers{"/shape/outline"});
+  CHECK(faults(R"("view":[1,2],"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]})") ==
+        Pointers{"/shape/view"});
+  CHECK(with(R"({"type":"blob"})") == Pointers{"/shape/outline/type"});
+  CHECK(with(R"({"type":"polygon","vertices":[[0,0],[1,1]]})") == Pointers{"/shape/outline/vertices"});
+  CHECK(with(R"({"type":"polygon","vertices":[[0,0],[1,1],[1]]})") == Pointers{"/shape/outline/vertices/2"});
+  CHECK(with(R"({"type":"polygon","vertices":[[0,0],[1,1],[1,null]]})") ==
+        Pointers{"/shape/outline/vertices/2/1"});
+  CHECK(with(R"({"type":"ellipse","center":[0,0],"half_axes":[1,0]})") ==
+        Pointers{"/shape/outline/half_axes"});
+  CHECK(with(R"({"type":"polyline","vertices":[[0,0]],"width":-1})") == Pointers{"/shape/outline/width"});
+  CHECK(with(R"({"type":"ellipse","center":[0,0],"half_axes":[1,1],"width":1})") ==
+        Pointers{"/shape/outline/width"});
+  CHECK(
+      refused(
+          R"({"mode":"add","shape":{"type":"screen","view":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,0],"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]}}})",
+          parse_paint_operation) == Pointers{"/shape/view"});
+}
+
+TEST_CASE("floods have a seed and any bounds") {
+  const auto all = accepted(
+      R"({"mode":"flood","seed":[1,2,3],"angle_deg":90,"radius":0.5,"stop_at_other":true,"steal":true})",
+      parse_paint_operation);
+  CHECK(all.flood.seed == Vec3d(1, 2, 3));
+  CHECK(all.flood.angle_rad == std::numbers::pi / 2);
+  CHECK(all.flood.radius == 0.5);
+  CHECK(all.flood.stop_at_other);
+  CHECK(all.steal);
+  const auto none = accepted(R"({"mode":"flood","seed":[1,2,3]})", parse_paint_operation);
+  CHECK_FALSE(none.flood.angle_rad.has_value());
+  CHECK_FALSE(none.flood.radius.has_value());
+  CHECK_FALSE(none.flood.stop_at_other);
+  CHECK(accepted(R"({"mode":"flood","seed":[1,2,3],"angle_deg":180})", parse_paint_operation)
+            .flood.angle_rad.has_value());
+  const auto faults = [](const std::string& members) {
+    return refused(R"({"mode":"flood")" + members + "}", parse_paint_operation);
+  };
+  CHECK(faults("") == Pointers{"/seed"});
+  CHECK(faults(R"(,"seed":[1,2])") == Pointers{"/seed"});
+  CHECK(faults(R"(,"seed":[1,2,1e13])") == Pointers{"/seed"});
+  CHECK(faults(R"(,"seed":[1,2,3],"angle_deg":180.5)") == Pointers{"/angle_deg"});
+  CHECK(faults(R"(,"seed":[1,2,3],"angle_deg":null)") == Pointers{"/angle_deg"});
+  CHECK(faults(R"(,"seed":[1,2,3],"radius":0)") == Pointers{"/radius"});
+  CHECK(faults(R"(,"seed":[1,2,3],"stop_at_other":1)") == Pointers{"/stop_at_other"});
+  CHECK(faults(R"(,"seed":[1,2,3],"shape":{"type":"all"})") == Pointers{"/shape"});
 }
 
 TEST_CASE("the engine's verdict on values comes back with the document's pointer") {
@@ -223,7 +324,15 @@ TEST_CASE("what was read is written back and read again to the bit") {
        R"({"mode":"set","shape":{"type":"stroke","vertices":[[0.0,1.0,2.0]],"radius":0.5},"facing":[0.0,0.0,1.0],"steal":true})",
        R"({"mode":"remove","shape":{"type":"box","min":[-1.0,-1.0,-1.0],"max":[1.0,1.0,1.0]}})",
        R"({"mode":"intersect","shape":{"type":"half_space","point":[0.0,0.0,0.0],"normal":[0.0,1.0,0.0]}})",
-       R"({"mode":"add","shape":{"type":"all"}})"}) {
+       R"({"mode":"add","shape":{"type":"all"}})",
+       R"({"mode":"add","shape":{"type":"points","points":[[0.1,0.0,2.0]],"radius":0.5}})",
+       R"({"mode":"add","shape":{"type":"points","points":[[0.1,0.0,2.0],[1.0,0.0,0.0]],"radii":[0.5,0.25]}})",
+       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"polygon","vertices":[[0.0,0.1],[1.0,0.0],[0.5,1.0]]}}})",
+       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"ellipse","center":[0.0,0.1],"half_axes":[1.0,0.3]}}})",
+       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"polyline","vertices":[[0.0,0.1]],"width":0.3}},"steal":true})",
+       R"({"mode":"flood","seed":[0.1,0.0,2.0],"angle_deg":33.3,"radius":0.5,"stop_at_other":true,"steal":true})",
+       R"({"mode":"flood","seed":[0.1,0.0,2.0]})", R"({"mode":"invert","steal":true})", R"({"mode":"clear"})",
+       R"({"mode":"grow","distance":0.1})", R"({"mode":"shrink","distance":1e-09})"}) {
     CHECK(to_json(accepted(text, parse_paint_operation)).dump() == text);
   }
   const char* edit =
