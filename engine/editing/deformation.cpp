@@ -63,7 +63,8 @@ Result<void> validate_one(const TowardPoint& toward) {
   if (auto point = check_point(toward.target, "target"); !point) return point;
   if (!std::isfinite(toward.amount)) return non_finite("amount");
   if (toward.amount >= -kMaxDeformationFactor && toward.amount <= 1.0) return {};
-  return beyond("the amount must lie between -1000 and 1", "amount", 1.0, toward.amount);
+  return beyond("the amount must lie between -1000 and 1", "amount",
+                toward.amount < 0.0 ? -kMaxDeformationFactor : 1.0, toward.amount);
 }
 
 Result<void> validate_one(const Rotation& rotation) {
@@ -75,12 +76,13 @@ Result<void> validate_one(const Rotation& rotation) {
 Result<void> validate_one(const Scaling& scaling) {
   if (auto center = check_point(scaling.center, "center"); !center) return center;
   if (!scaling.factors.allFinite()) return non_finite("factors");
-  if (scaling.factors.minCoeff() >= 1.0 / kMaxDeformationFactor &&
-      scaling.factors.maxCoeff() <= kMaxDeformationFactor) {
-    return {};
-  }
-  return beyond("the factors must lie between 0.001 and 1000", "factors", kMaxDeformationFactor,
-                scaling.factors.maxCoeff());
+  constexpr double kLeast = 1.0 / kMaxDeformationFactor;
+  const double least = scaling.factors.minCoeff();
+  const double greatest = scaling.factors.maxCoeff();
+  if (least >= kLeast && greatest <= kMaxDeformationFactor) return {};
+  const bool small = least < kLeast;
+  return beyond("the factors must lie between 0.001 and 1000", "factors",
+                small ? kLeast : kMaxDeformationFactor, small ? least : greatest);
 }
 
 Result<void> validate_one(const Twist& twist) {
@@ -90,7 +92,8 @@ Result<void> validate_one(const Twist& twist) {
   if (!std::isfinite(twist.length)) return non_finite("length");
   constexpr double kLeastLength = 1.0 / kMaxDeformationLength;
   if (twist.length >= kLeastLength && twist.length <= kMaxDeformationLength) return {};
-  return beyond("the length must lie between 1e-9 and 1e9", "length", kMaxDeformationLength, twist.length);
+  return beyond("the length must lie between 1e-9 and 1e9", "length",
+                twist.length < kLeastLength ? kLeastLength : kMaxDeformationLength, twist.length);
 }
 
 Mat3d cross_matrix(const Vec3d& a) {
@@ -186,7 +189,7 @@ Result<void> validate(const Deformation& deformation) {
   const std::size_t count = deformation.steps.size();
   if (count == 0 || count > kMaxDeformationSteps) {
     return beyond("a deformation has 1 to 8 steps", "deformation.steps",
-                  static_cast<double>(kMaxDeformationSteps), static_cast<double>(count));
+                  count == 0 ? 1.0 : static_cast<double>(kMaxDeformationSteps), static_cast<double>(count));
   }
   for (std::size_t i = 0; i < count; ++i) {
     const ElementaryDeformation& one = deformation.steps[i];

@@ -86,12 +86,15 @@ TurnArgs turn_args(const Points& rest, const std::vector<std::uint32_t>& blocks,
   return args;
 }
 
-NormalStencil::Moved moved_level(const MultiresSurface& rest, std::size_t k, MultiresSurface& edited) {
+NormalStencil::Moved moved_level(const MultiresSurface& rest, std::size_t k, const EditParams& params,
+                                 const ScaleField& field, MultiresSurface& edited) {
   return {.rest = &rest.levels[k],
           .rest_base = &rest.levels[k - 1],
           .base_normal = &edited.levels[k - 1].normal,
           .position = &edited.levels[k].position,
-          .normal = &edited.levels[k].normal};
+          .normal = &edited.levels[k].normal,
+          .gains = !params.gains.empty() && params.gains[k - 1] != 1.0F,
+          .t = field.t.data()};
 }
 
 }  // namespace
@@ -137,7 +140,8 @@ void apply_edit(const MultiresSurface& surface, const EditPlan& plan, const Edit
       const TurnArgs turn = carries && plan.rigid_only() ? turn_args(surface.levels[k].normal, blocks,
                                                                      rotation, field, edited.levels[k].normal)
                                                          : TurnArgs{};
-      const NormalStencil::Moved moved = carries ? moved_level(surface, k, edited) : NormalStencil::Moved{};
+      const NormalStencil::Moved moved =
+          carries ? moved_level(surface, k, params, field, edited) : NormalStencil::Moved{};
       parallel_for(
           blocks.size(),
           [&](std::size_t begin, std::size_t end) {

@@ -35,7 +35,7 @@ Result<void> validate(const EditParams& params, const MultiresSurface& surface);
 /// its bits. Levels coarser than k are returned as they were; the session re-derives them when next needed.
 /// Normals:     on level k those of the deformed surface, cofactor(J) n, exactly; on finer levels carried by
 ///              how their neighbourhoods move (engine/multires/normal_stencil.h), and turned exactly where a
-///              sample and its neighbours move as one rigid body
+///              rigid motion takes a sample whole (t = 1 without a gradient)
 /// Promises:    t = 0 samples bit-identical on every level; a zero deformation with gains 1 is the identity,
 ///              to the bit; a rigid motion of everything is reproduced to 1e-6 of the diagonal
 /// Pre:         valid parameters, finite input, the graph of the samples at rest. Never gives NaN

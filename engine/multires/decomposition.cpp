@@ -6,6 +6,7 @@
 
 #include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
+#include "engine/multires/base_point_kernels.h"
 #include "engine/multires/base_point_walk.h"
 #include "engine/normals/plane_fit.h"
 
@@ -113,6 +114,14 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
                                 const ExecutionContext& context) {
   if (!(params.sigma > 0.0F && params.sigma <= 100.0F)) {
     return out_of_range("sigma must lie in (0, 100]", "sigma", 100.0, static_cast<double>(params.sigma));
+  }
+  constexpr std::size_t kMostBaseSamples = (std::size_t{1} << 31) / kMaxPlaneCandidates;  // 32-bit indices
+  if (base.position.size() > kMostBaseSamples) {
+    return Error{.code = ErrorCode::kTooLarge,
+                 .message = "the base of a band has at most 85 million samples",
+                 .field = "scales",
+                 .limit = static_cast<double>(kMostBaseSamples),
+                 .actual = static_cast<double>(base.position.size())};
   }
   const std::size_t n = position.size();
   Decomposition result;

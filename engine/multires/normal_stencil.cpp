@@ -63,7 +63,9 @@ StencilColumns NormalStencil::columns() const {
 }
 
 void NormalStencil::carry(const Moved& moved, std::size_t begin, std::size_t end) const {
-  CarryNormalsArgs args{.neighbors = graph_->lanes.data(),
+  CarryNormalsArgs args{.gains = moved.gains,
+                        .t = moved.t,
+                        .neighbors = graph_->lanes.data(),
                         .graph_k = graph_->k,
                         .k = k_,
                         .blocks = blocks_.data(),

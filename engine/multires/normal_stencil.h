@@ -39,10 +39,12 @@ class NormalStencil {
     const Level* rest_base;  ///< the next coarser level
     const Points* base_normal;
     const Points* position;
-    Points* normal;  ///< written
+    Points* normal;            ///< written
+    bool gains = false;        ///< the detail below was scaled: neighbours count even where a sample stands
+    const float* t = nullptr;  ///< with gains: samples with t = 0 keep their normals all the same
   };
   /// Normals of the samples of blocks()[begin] .. blocks()[end - 1]. A sample that stands where it stood,
-  /// with the normal of its base unchanged, keeps its own to the bit; where the neighbours span no plane, the
+  /// with the normal of its base unchanged, keeps its own to the bit (with gains where t = 0 alone); where the neighbours span no plane, the
   /// smallest rotation that the base's normal has made stands in.
   /// Cost:        O(k) a sample, sequential: callers cut the blocks into ranges
   /// Determinism: bitwise equal for any instruction set

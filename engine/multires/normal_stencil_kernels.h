@@ -33,6 +33,10 @@ struct BuildStencilArgs {
 };
 
 struct CarryNormalsArgs {
+  /// A sample that stands where it stood keeps its normal; with gains on the detail only where t = 0, or
+  /// nowhere where there is no t.
+  bool gains;
+  const float* t;
   const float* rest_position[3];
   const float* rest_normal[3];
   const float* position[3];

@@ -39,14 +39,15 @@ void rebuild_positions(const MultiresSurface& rest, std::size_t k, float gain, c
 }
 
 // Normals of the level above `k`, whose samples have moved already.
-void carry(const MultiresSurface& rest, std::size_t k, const NeighborGraph& graph, const Level& base,
-           Level& above, const ExecutionContext* context) {
+void carry(const MultiresSurface& rest, std::size_t k, float gain, const NeighborGraph& graph,
+           const Level& base, Level& above, const ExecutionContext* context) {
   const NormalStencil stencil(rest.levels[k + 1], graph, NormalStencil::all_blocks(graph.count), context);
   const NormalStencil::Moved moved{.rest = &rest.levels[k + 1],
                                    .rest_base = &rest.levels[k],
                                    .base_normal = &base.normal,
                                    .position = &above.position,
-                                   .normal = &above.normal};
+                                   .normal = &above.normal,
+                                   .gains = gain != 1.0F};
   parallel_for(
       stencil.blocks().size(), [&](std::size_t begin, std::size_t end) { stencil.carry(moved, begin, end); },
       kParallelBlock / kSimdBlock, context);
@@ -88,7 +89,7 @@ Result<MultiresSurface> reconstruct(const MultiresSurface& surface, const Neighb
       estimate_normals(above.position, graph, NormalParams{}, above.normal, context);
       orient_like(rest_normal, above.normal);
     } else {
-      carry(surface, k, graph, base, above, context);
+      carry(surface, k, gain, graph, base, above, context);
     }
     if (gain != 1.0F)
       for (float& d : result.detail[k]) d *= gain;

@@ -77,7 +77,10 @@ class Batches {
     std::iota(forward_.get(), forward_.get() + count, 0U);
     pad_live();
   }
-  void pad_live() { std::fill(live_.get() + count_, live_.get() + padded_to_block(count_), live_[0]); }
+  // With the last one: lanes of one block write what belongs to it, whatever other threads do.
+  void pad_live() {
+    std::fill(live_.get() + count_, live_.get() + padded_to_block(count_), live_[count_ - 1]);
+  }
 
   // Rows from a graph over the samples that are left, which are all there is room for.
   void start_rows(const Points& position, const NeighborGraph& graph) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <numbers>
 
@@ -87,6 +88,16 @@ Deformation read_deformation(const Json& value, const std::string& pointer, Json
   return deformation;
 }
 
+/// The engine's verdict. Of a single step it speaks as of the deformation itself, of a document's sequence of
+/// one it must not.
+Result<void> verdict_of(const Deformation& deformation, bool is_sequence) {
+  auto verdict = validate(deformation);
+  if (verdict || !is_sequence || deformation.steps.size() != 1) return verdict;
+  Error error = verdict.error();
+  error.field.replace(0, std::string_view("deformation").size(), "deformation.steps[0]");
+  return error;
+}
+
 /// Reads the members of an edit; the caller reads further ones and finishes the object.
 EditParams read_edit_members(ObjectReader& object) {
   JsonErrors& errors = object.errors();
@@ -105,7 +116,7 @@ EditParams read_edit_members(ObjectReader& object) {
   if (const Json* const deformation = object.required("deformation")) {
     edit.deformation = read_deformation(*deformation, object.pointer_to("deformation"), errors);
     if (errors.fault_count == faults_before)
-      add_verdict(validate(edit.deformation), object.pointer(), errors);
+      add_verdict(verdict_of(edit.deformation, deformation->contains("steps")), object.pointer(), errors);
   }
   if (const Json* const gains = object.optional("gains")) {
     const std::string place = object.pointer_to("gains");
@@ -194,6 +205,15 @@ JsonDocument to_json(const Vec3d& vector) {
 
 namespace {
 
+/// The number with the fewest digits that is this float: 0.1, not 0.10000000149.
+double shortest(float value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  double number = 0.0;
+  std::from_chars(text.data(), end, number);
+  return number;
+}
+
 JsonDocument axis_to_json(const Vec3d& point, const Vec3d& direction) {
   return {{"point", to_json(point)}, {"direction", to_json(direction)}};
 }
@@ -240,7 +260,7 @@ JsonDocument to_json(const Deformation& deformation) {
 JsonDocument to_json(const EditParams& edit) {
   JsonDocument document{
       {"level", edit.level}, {"blend", blend_name(edit.blend)}, {"deformation", to_json(edit.deformation)}};
-  if (!edit.gains.empty()) document["gains"] = edit.gains;
+  for (const float gain : edit.gains) document["gains"].push_back(shortest(gain));
   return document;
 }
 

@@ -52,7 +52,7 @@ Result<Points> smoothed_points(const Cloud& cloud, const RestSurface& rest, cons
 
 Result<SimplifyTarget> target_of(const Cloud& cloud, const SimplifyOptions& options) {
   if (int{options.count.has_value()} + int{options.ratio.has_value()} + int{options.error.has_value()} != 1)
-    return wrong("one of --count, --ratio and --error", "target");
+    return wrong("one of --count, --ratio and --error", "");
   if (options.count) return SimplifyTarget(KeepCount{.count = *options.count});
   if (options.ratio) return SimplifyTarget(KeepRatio{.ratio = *options.ratio});
   const auto diagonal = static_cast<double>(bounds_of(cloud.position).diagonal());

@@ -13,6 +13,7 @@ struct Drag::Free {
   std::mutex mutex;
   std::vector<std::unique_ptr<MultiresSurface>> surfaces;
 
+  Free() { surfaces.reserve(kKept); }  // nothing can fail when a frame is dropped
   std::unique_ptr<MultiresSurface> take() {
     const std::lock_guard lock(mutex);
     if (surfaces.empty()) return nullptr;

@@ -303,7 +303,9 @@ Outcome<SurfaceState> Session::compute(const EditParams& params) {
     drag_ = std::make_unique<Drag>(rest_, now->surface, field.value(), params);
     note_time("plan", begin);
   }
-  SurfaceState after{.surface = drag_->frame(params),
+  auto surface = drag_->frame(params);
+  if (auto reach = check_reach(*surface, params.level); !reach) return protocol::to_problem(reach.error());
+  SurfaceState after{.surface = std::move(surface),
                      .reports = now->surface.reports,
                      .first_valid_level = std::max(now->surface.first_valid_level, params.level)};
   note_time("edit", begin);

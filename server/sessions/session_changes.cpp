@@ -153,6 +153,8 @@ Outcome<SharedDocument> Session::move_head(std::size_t edit, Expected expected) 
                      .actual = static_cast<double>(edit)};
     if (edit == before->head) return before;  // idempotent
     const auto begin = SteadyClock::now();
+    last_preview_.reset();
+    drag_.reset();  // replaying wants the memory
     if (auto moved = history_->move_head(edit); !moved) return protocol::to_problem(moved.error());
     Document after = *before;
     after.surface = history_->current();

@@ -1,7 +1,8 @@
 #include "server/sessions/surface_state.h"
 
 #include <algorithm>
-#include <cstring>
+#include <cmath>
+#include <string>
 
 #include "engine/core/parallel.h"
 #include "engine/editing/region.h"
@@ -40,15 +41,23 @@ std::uint64_t memory_of(const SurfaceState& state) {
 
 Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState& state, std::uint32_t level,
                                       const ExecutionContext& context) {
-  if (level >= state.first_valid_level) return state;
+  const std::uint32_t valid = state.first_valid_level;
+  if (level >= valid) return state;
+  // The levels that are valid stay as they are, to the bit: the coarsest of them is what the others are made
+  // of. So looking at a level changes no later edit.
+  const Level& from = state.surface->levels[valid];
   Cloud current = *rest.cloud;
-  current.position = state.surface->finest().position;
-  current.normal = state.surface->finest().normal;
+  current.position = from.position;
+  current.normal = from.normal;
   current.exact_position.clear();
   current.position_is_double = false;
   // The scales are lengths of the model, not of whatever box the edited surface happens to fill; where that
   // box leaves no such fraction, the nearest one that a builder takes. The reports say what was reached.
+  // Variances add: level `valid` has that of its own scale already.
   HierarchyParams params = rest.params;
+  const float own = valid < params.scales.size() ? params.scales[valid] : 0.0F;
+  params.scales.resize(valid);
+  for (float& scale : params.scales) scale = std::sqrt(scale * scale - own * own);
   const float diagonal = bounds_of(current.position).diagonal();
   if (diagonal > 0.0F) {
     for (float& scale : params.scales) scale *= rest.diagonal / diagonal;
@@ -56,12 +65,17 @@ Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState&
   }
   auto built = rest.build(current, params, context);
   if (!built) return built.error();
-  auto surface = std::make_shared<MultiresSurface>(std::move(built.value().surface));
-  surface->levels.back() = state.surface->finest();
-  return SurfaceState{
-      .surface = std::move(surface),
-      .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(built.value().reports)),
-      .first_valid_level = 0};
+  auto surface = std::make_shared<MultiresSurface>(*state.surface);
+  auto reports = std::make_shared<std::vector<DecompositionReport>>(*state.reports);
+  for (std::uint32_t k = 0; k < valid; ++k) {
+    surface->levels[k] = std::move(built.value().surface.levels[k]);
+    surface->detail[k] = std::move(built.value().surface.detail[k]);
+    (*reports)[k] = built.value().reports[k];
+    const float derived = (*reports)[k].scale;
+    const float base = valid < reports->size() ? (*reports)[valid].scale : 0.0F;
+    (*reports)[k].scale = std::sqrt(derived * derived + base * base);
+  }
+  return SurfaceState{.surface = std::move(surface), .reports = std::move(reports), .first_valid_level = 0};
 }
 
 Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const SurfaceState& state,
@@ -78,6 +92,27 @@ SurfaceState edited(const RestModel& rest, const SurfaceState& state, const Edit
                           apply_edit(*state.surface, *rest.graph, params, field, rest.cloud->origin)),
                       .reports = state.reports,
                       .first_valid_level = std::max(state.first_valid_level, params.level)};
+}
+
+Result<void> check_reach(const MultiresSurface& surface, std::uint32_t level) {
+  for (std::size_t k = level; k < surface.levels.size(); ++k) {
+    const Points& p = surface.levels[k].position;
+    const auto beyond = parallel_sum<std::size_t>(p.size(), 0, [&](std::size_t begin, std::size_t end) {
+      std::size_t count = 0;
+      for (std::size_t i = begin; i < end; ++i) {
+        const float reach = std::abs(p.x()[i]) + std::abs(p.y()[i]) + std::abs(p.z()[i]);
+        count += static_cast<std::size_t>(!(reach <= kMaxReach));  // NaN as well
+      }
+      return count;
+    });
+    if (beyond == 0) continue;
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "the edit takes " + std::to_string(beyond) + " samples farther than 1e12 away",
+                 .field = "deformation",
+                 .limit = double{kMaxReach},
+                 .actual = static_cast<double>(bounds_of(p).diagonal())};
+  }
+  return {};
 }
 
 Result<SurfaceState> replayed(const RestModel& rest, const SurfaceState& before, const RecordedEdit& record,

@@ -14,14 +14,16 @@ namespace {
 
 /// Bytes a sample of a session with one band: the hierarchy while it is built, then the rest, the committed,
 /// the previewed and the shown surface with their fields and frames.
-constexpr std::uint64_t kBytesPerSample = 400;
+constexpr std::uint64_t kBytesPerSample = 500;
 /// What another band adds to a surface: positions, normals and the detail coefficient.
 constexpr std::uint64_t kBytesPerBand = 28;
-/// Surfaces of a session that are not in its history: the committed, the previewed, the shown, and one that
-/// is being made.
-constexpr std::uint64_t kLiveSurfaces = 4;
-/// What a drag keeps a sample for each band: the stencils that carry normals. And a sample's neighbours.
+/// Surfaces of a session that are not in its history: the committed, the previewed, the shown, one that is
+/// being made, and two whose memory a drag keeps.
+constexpr std::uint64_t kLiveSurfaces = 6;
+/// What a drag keeps a sample for each band, and while it is prepared once more: the stencils that carry
+/// normals. Then shape operators, and a sample's neighbours.
 constexpr std::uint64_t kStencilBytes = 4 * NormalStencil::kNeighbors + 16;
+constexpr std::uint64_t kShapeBytes = 12;
 constexpr std::uint64_t kBytesPerNeighbor = 4;
 /// Stored history states that a session may need at most before it thins them out, and the bytes a sample of
 /// one with one band.
@@ -48,7 +50,7 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
                    .errors = {{.pointer = "/cloud", .detail = "no such cloud"}}};
   const std::uint64_t samples = cloud->cloud->size();
   const std::uint64_t more_bands = (request.params.scales.size() - 1) * kBytesPerBand;
-  const std::uint64_t drag = request.params.scales.size() * kStencilBytes;
+  const std::uint64_t drag = (request.params.scales.size() + 1) * kStencilBytes + kShapeBytes;
   const std::uint64_t graph = request.params.neighbors * kBytesPerNeighbor;
   const std::uint64_t live = samples * (kBytesPerSample + kLiveSurfaces * more_bands + drag + graph);
   const std::uint64_t history =

@@ -75,6 +75,14 @@ LocalSurface local_surface(const Vec3f& normal, const ShapeOperators& shape, std
   return {.normal = n, .shape_operator = S};
 }
 
+// Scalings away from far off, then twists: what overflows in a Jacobian must not reach the normals.
+std::vector<ElementaryDeformation> far_and_twisted(std::size_t scalings, std::size_t twists) {
+  std::vector<ElementaryDeformation> steps(
+      scalings, Scaling{.center = Vec3d(1e9, 0.0, 0.0), .factors = Vec3d(1e3, 1e3, 1e3)});
+  steps.insert(steps.end(), twists, Twist{.angle_rad = 628.0, .length = 1e-9});
+  return steps;
+}
+
 void check_refused(const Deformation& deformation, ErrorCode code, const char* field) {
   const Result<void> result = validate(deformation);
   REQUIRE(!result.ok());
@@ -305,7 +313,8 @@ TEST_CASE("extreme but valid input never gives NaN") {
         Deformation(Scaling{.center = Vec3d(-1e9, 0.0, 0.0), .factors = Vec3d(1e3, 1e-3, 1.0)}),
         Deformation(TowardPoint{.target = Vec3d(1e9, 0.0, 0.0), .amount = 1.0}),
         Deformation(TowardPoint{.amount = -1e3}), Deformation(NormalOffset{.distance = -1e9}),
-        Deformation(Twist{.axis = Vec3d(1.0, 0.0, 0.0), .angle_rad = 628.0, .length = 1e-9})}) {
+        Deformation(Twist{.axis = Vec3d(1.0, 0.0, 0.0), .angle_rad = 628.0, .length = 1e-9}),
+        Deformation(far_and_twisted(7, 1)), Deformation(far_and_twisted(6, 2))}) {
     REQUIRE(validate(deformation).ok());
     const ShapeOperators shape = constant_shape(256, 1e30F, 1e30F, -1e30F);
     const Level result = deformed(deformation, Vec3d::Zero(), samples.field, samples.level, &shape);

@@ -261,6 +261,19 @@ TEST_CASE("an offset along the normals of a sphere makes a larger sphere, and em
   CHECK(worst < 5e-3);  // of the regressed curvature
 }
 
+TEST_CASE("a band that is taken away leaves the normals of what is below, where detail was 0 too") {
+  const Model& model = plane();
+  const EditParams params{.deformation = Translation{}, .gains = {0.0F, 0.0F}};
+  const MultiresSurface after = apply_edit(model.surface, model.graph, params,
+                                           test::constant_field(model.at.size(), 1.0F), Vec3d::Zero());
+  float worst = 0.0F;
+  for (std::size_t i = 0; i < model.at.size(); ++i) {
+    if (std::max(std::abs(model.at[i].x()), std::abs(model.at[i].y())) > 0.9F) continue;
+    worst = std::max(worst, (after.finest().normal[i] - Vec3f::UnitZ()).norm());
+  }
+  CHECK(worst < 0.02F);
+}
+
 TEST_CASE("gains smooth, keep or exaggerate a band where t is 1, and leave the zero-region alone") {
   const Model& model = sphere();
   for (const float gain : {0.0F, 0.5F, 2.0F}) {

@@ -253,6 +253,11 @@ TEST_CASE("every kind of deformation is read, checked and written back to the bi
   CHECK(faults(R"({"type":"twist","axis":{"point":[0,0,0],"direction":[0,0,0]},"angle_deg":1,"length":1})") ==
         Pointers{"/deformation/axis/direction"});
   CHECK(faults(R"({"type":"sequence","steps":[]})") == Pointers{"/deformation/steps"});
+  CHECK(faults(R"({"type":"sequence","steps":[{"type":"scale","center":[0,0,0],"factors":[0,1,1]}]})") ==
+        Pointers{"/deformation/steps/0/factors"});
+  const auto tenth =
+      accepted(R"({"level":0,"deformation":{"type":"along_normal","distance":1},"gains":[0.1]})", parse_edit);
+  CHECK(to_json(tenth)["gains"].dump() == "[0.1]");
   CHECK(faults(R"({"type":"sequence","steps":[{"type":"sequence","steps":[]}]})") ==
         Pointers{"/deformation/steps/0/type"});
   CHECK(

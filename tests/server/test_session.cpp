@@ -290,6 +290,60 @@ TEST_CASE("every kind of edit gives the same bits previewed, committed, after ot
   }
 }
 
+TEST_CASE("looking at a level changes no later edit, and replaying gives what was there") {
+  const auto open = [](Workshop& workshop) {
+    return Session::create(
+        {.id = "AAAAAAAAAAAAAAAAAAAAAA",
+         .name = "sheet",
+         .cloud_id = "BBBBBBBBBBBBBBBBBBBBBB",
+         .cloud = workshop.cloud,
+         .hierarchy = {.scales = {0.1F, 0.05F}},
+         .history_bytes = 1,
+         .max_edits = 50,
+         .max_operations = 5},
+        {.interactive = workshop.interactive, .background = workshop.background, .build = build_hierarchy});
+  };
+  Workshop workshop;
+  const auto looked = open(workshop);
+  const auto plain = open(workshop);
+  for (const auto& session : {looked, plain}) {
+    REQUIRE(comes_true([&] { return session->document()->state == protocol::SessionState::kReady; }));
+    REQUIRE(session->paint(RegionKind::kZero, left_of(0.2)).ok());
+    REQUIRE(session->paint(RegionKind::kOne, right_of(0.8)).ok());
+    commit(*session, turn(0.4, 1));
+  }
+  const Level before = looked->document()->surface.surface->levels[1];
+  REQUIRE(looked->committed_picture(0, false).ok());
+  CHECK(looked->document()->surface.first_valid_level == 0);
+  CHECK(looked->document()->surface.surface->levels[1] == before);
+  CHECK(looked->document()->surface.surface->levels[0] != plain->document()->surface.surface->levels[0]);
+  for (const auto& session : {looked, plain}) commit(*session, turn(0.3, 1));
+  const Level after = finest(*plain);
+  CHECK(finest(*looked) == after);
+  REQUIRE(looked->move_head(0).ok());
+  REQUIRE(looked->move_head(2).ok());
+  CHECK(finest(*looked) == after);
+}
+
+TEST_CASE("an edit that takes samples out of reach is refused, however many lead there") {
+  Workshop workshop;
+  const auto session = workshop.painted();
+  const Scaling away{.center = Vec3d(1e9, 0, 0), .factors = Vec3d(1e3, 1e3, 1e3)};
+  const EditParams far{.deformation = Deformation(std::vector<ElementaryDeformation>(8, away))};
+  const auto refused = session->commit(far, session->document()->revision);
+  CHECK(kind_of(refused) == ProblemKind::kInvalidValue);
+  CHECK(refused.problem().errors.at(0).pointer == "/deformation");
+  CHECK(kind_of(session->render_preview({.edit = far, .sequence = 1}, 0)) == ProblemKind::kInvalidValue);
+  int made = 0;
+  for (; made < 12; ++made) {
+    const auto one = session->commit({.level = 1, .deformation = away}, session->document()->revision);
+    if (!one.ok()) break;
+  }
+  CHECK(made < 3);
+  REQUIRE(session->committed_picture(0, false).ok());
+  REQUIRE(session->move_head(0).ok());
+}
+
 TEST_CASE("a picture that is shown is never written over by the frames after it") {
   Workshop workshop;
   const auto session = workshop.painted();

@@ -21,9 +21,13 @@ export type SessionDocument = WithVectors<Schemas["Session"]>;
 export type SessionSummary = WithVectors<Schemas["SessionSummary"]>;
 export type PaintedSession = WithVectors<Schemas["PaintedSession"]>;
 
-export type Shape = WithVectors<Schemas["Shape"]>;
+/** The shapes that the viewer paints with. */
+export type Shape = WithVectors<Exclude<Schemas["Shape"], { type: "points" | "screen" }>>;
 /** What the server need not be told has its default. */
-export type RegionOperation = Omit<WithVectors<Schemas["PaintOperation"]>, "steal"> & { steal?: boolean };
+export type RegionOperation = Omit<WithVectors<Schemas["ShapeOperation"]>, "shape" | "steal"> & {
+  shape: Shape;
+  steal?: boolean;
+};
 
 export type Deformation = WithVectors<Schemas["Deformation"]>;
 export type Blend = Schemas["Blend"];

@@ -564,7 +564,7 @@ export interface components {
             /** @description Samples that changed their mark */
             changed: components["schemas"]["Count"];
         };
-        Shape: components["schemas"]["SphereShape"] | components["schemas"]["StrokeShape"] | components["schemas"]["BoxShape"] | components["schemas"]["HalfSpaceShape"] | components["schemas"]["AllShape"];
+        Shape: components["schemas"]["SphereShape"] | components["schemas"]["StrokeShape"] | components["schemas"]["BoxShape"] | components["schemas"]["HalfSpaceShape"] | components["schemas"]["AllShape"] | components["schemas"]["PointsShape"] | components["schemas"]["ScreenShape"];
         SphereShape: {
             /** @constant */
             type: "sphere";
@@ -596,7 +596,47 @@ export interface components {
             /** @constant */
             type: "all";
         };
-        PaintOperation: {
+        /** @description Everything within a radius of any of the points: one `radius` for all of them, or `radii` with one for each */
+        PointsShape: {
+            /** @constant */
+            type: "points";
+            points: components["schemas"]["Vector"][];
+            radius?: number;
+            radii?: number[];
+        } & (unknown | unknown);
+        /**
+         * @description Everything that a view projects into an outline, on every depth; nothing behind the eye. Outlines are in
+         *     normalised device coordinates
+         */
+        ScreenShape: {
+            /** @constant */
+            type: "screen";
+            /** @description Model to clip space, row after row: clip = view * (x, y, z, 1); shown where clip w > 0 */
+            view: number[];
+            outline: components["schemas"]["PolygonOutline"] | components["schemas"]["EllipseOutline"] | components["schemas"]["PolylineOutline"];
+        };
+        ScreenPoint: number[];
+        /** @description A lasso, closed by itself; inside is where it turns around a point an odd number of times */
+        PolygonOutline: {
+            /** @constant */
+            type: "polygon";
+            vertices: components["schemas"]["ScreenPoint"][];
+        };
+        EllipseOutline: {
+            /** @constant */
+            type: "ellipse";
+            center: components["schemas"]["ScreenPoint"];
+            half_axes: number[];
+        };
+        /** @description Everything within half the width of a line */
+        PolylineOutline: {
+            /** @constant */
+            type: "polyline";
+            vertices: components["schemas"]["ScreenPoint"][];
+            width: number;
+        };
+        PaintOperation: components["schemas"]["ShapeOperation"] | components["schemas"]["MembershipOperation"] | components["schemas"]["DistanceOperation"] | components["schemas"]["FloodOperation"];
+        ShapeOperation: {
             /**
              * @description add: samples in the shape join the region; remove: they leave it; intersect: samples outside leave it;
              *     set: exactly those in the shape
@@ -606,6 +646,56 @@ export interface components {
             shape: components["schemas"]["Shape"];
             /** @description Only samples whose normal points along this direction (toward the viewer) */
             facing?: components["schemas"]["Vector"];
+            /**
+             * @description Samples that join leave the other region
+             * @default false
+             */
+            steal: boolean;
+        };
+        MembershipOperation: {
+            /**
+             * @description invert: members leave the region, all other samples join it; clear: all leave
+             * @enum {string}
+             */
+            mode: "invert" | "clear";
+            /**
+             * @description Samples that join leave the other region
+             * @default false
+             */
+            steal: boolean;
+        };
+        DistanceOperation: {
+            /**
+             * @description grow: samples within the distance of a member join the region; shrink: members within the distance of a
+             *     sample that is none leave it
+             * @enum {string}
+             */
+            mode: "grow" | "shrink";
+            /** @description In model units */
+            distance: number;
+            /**
+             * @description Samples that join leave the other region
+             * @default false
+             */
+            steal: boolean;
+        };
+        /**
+         * @description Samples that a flood reaches join the region. It starts at the sample nearest to the seed and spreads over
+         *     neighbours, within all the bounds that are given; without any it fills what is connected
+         */
+        FloodOperation: {
+            /** @constant */
+            mode: "flood";
+            seed: components["schemas"]["Vector"];
+            /** @description Not across a greater angle between the normals of neighbours */
+            angle_deg?: number;
+            /** @description Only within this distance of the seed */
+            radius?: number;
+            /**
+             * @description Not onto samples of the other region
+             * @default false
+             */
+            stop_at_other: boolean;
             /**
              * @description Samples that join leave the other region
              * @default false
