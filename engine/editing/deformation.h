@@ -109,8 +109,9 @@ Mat3d deformation_jacobian(const Deformation& deformation, const Vec3d& p, doubl
 /// Deforms samples and their normals: position' = F(position, t), normal' = cofactor(J) normal, normalised.
 /// Samples with t = 0 keep their bits, and so do samples that F leaves in place (a zero vector, whole turns)
 /// with a gradient that does not bend them. Where J folds the surface (the normal vanishes) the normal turns
-/// with dF/dp; an offset beyond a focal point counts as one without curvature. A position is within 5e-7 of deform_point, relative to its distance from the axis or centre
-/// and to its coordinates; a twist by n turns within n times as much.
+/// with dF/dp; an offset beyond a focal point counts as one without curvature. A position is within 5e-7 of
+/// deform_point, relative to its distance from the axis or centre and to its coordinates; a twist by n turns
+/// within n times as much.
 /// Shapes:      positions relative to `origin`; outputs are resized to N; outputs may not alias inputs
 /// Pre:         a valid deformation, a field of N samples, finite input; N shape operators where it needs
 ///              them. Never gives NaN

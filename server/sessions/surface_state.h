@@ -57,8 +57,8 @@ Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const 
 
 /// How far from the cloud's origin an edit may take a sample, model units, summed over the axes.
 inline constexpr float kMaxReach = 1e12F;
-/// Errors: kInvalidArgument (field "deformation") where a sample of the levels from `level` on is farther than
-///         that, or nowhere. An edited surface is the next edit's input: this is what keeps that finite.
+/// Errors: kInvalidArgument (field "deformation") where a sample of the levels from `level` on is farther
+///         than that, or nowhere. An edited surface is the next edit's input: this is what keeps it finite.
 Result<void> check_reach(const MultiresSurface& surface, std::uint32_t level);
 
 /// The state after an edit. Pre: the level is valid and `field` belongs to it.

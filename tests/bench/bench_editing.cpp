@@ -61,12 +61,13 @@ void bench_size(BenchReport& report, const Size& size) {
   const Vec3d origin = Vec3d::Zero();
 
   Marks marks(n, 0);
-  paint(half(1.0), RegionKind::kZero, finest.position, finest.normal, origin, marks);
-  paint(half(-1.0), RegionKind::kOne, finest.position, finest.normal, origin, marks);
+  const PaintSurface painted_on{.position = finest.position, .normal = finest.normal, .origin = origin};
+  paint(half(1.0), RegionKind::kZero, painted_on, marks);
+  paint(half(-1.0), RegionKind::kOne, painted_on, marks);
   const PaintOperation brush{.shape = brush_stroke(), .steal = true};
   report.time(name("paint"), "ms", items, [&] {
     Marks painted = marks;
-    paint(brush, RegionKind::kOne, finest.position, finest.normal, origin, painted);
+    paint(brush, RegionKind::kOne, painted_on, painted);
     const RegionPair regions = regions_from_marks(base.position, spacing, painted, origin).value();
     compute_scale_field(base.position, regions, Blend::kQuartic);
   });

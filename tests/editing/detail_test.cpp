@@ -61,6 +61,9 @@ class Exact {
   [[nodiscard]] Vec3d level2(const Vec3d& q) const {
     return level1(q) + fine_detail(base_.project(q)) * normal1(q);
   }
+  [[nodiscard]] Vec3d normal2(const Vec3d& q) const {
+    return normal_of(q, 1e-3, [this](const Vec3d& x) { return level2(x); });
+  }
 
  private:
   template <typename Surface>
@@ -103,7 +106,7 @@ Model model_of(const Base& base, const Points& scattered) {
     levels[1].position.set(i, rest.level1(q).cast<float>());
     levels[1].normal.set(i, rest.normal1(q).cast<float>());
     levels[2].position.set(i, rest.level2(q).cast<float>());
-    levels[2].normal.set(i, levels[1].normal[i]);
+    levels[2].normal.set(i, rest.normal2(q).cast<float>());
     model.surface.detail[0][i] = static_cast<float>(coarse_detail(base.project(q)));
     model.surface.detail[1][i] = static_cast<float>(fine_detail(base.project(q)));
     const Field at = field_at(base.project(q));
