@@ -44,8 +44,8 @@ class NormalStencil {
     const float* t = nullptr;  ///< with gains: samples with t = 0 keep their normals all the same
   };
   /// Normals of the samples of blocks()[begin] .. blocks()[end - 1]. A sample that stands where it stood,
-  /// with the normal of its base unchanged, keeps its own to the bit (with gains where t = 0 alone); where the
-  /// neighbours span no plane, the smallest rotation that the base's normal has made stands in.
+  /// with the normal of its base unchanged, keeps its own to the bit (with gains where t = 0 alone); where
+  /// the neighbours span no plane, the smallest rotation that the base's normal has made stands in.
   /// Cost:        O(k) a sample, sequential: callers cut the blocks into ranges
   /// Determinism: bitwise equal for any instruction set
   void carry(const Moved& moved, std::size_t begin, std::size_t end) const;
