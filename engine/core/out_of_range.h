@@ -1,5 +1,5 @@
 #pragma once
-// The error of a parameter outside of its range.
+// The errors of numbers outside of their range.
 
 #include <string>
 #include <utility>
@@ -15,6 +15,13 @@ inline Error out_of_range(std::string message, std::string field, double limit, 
                .field = std::move(field),
                .limit = limit,
                .actual = actual};
+}
+
+/// More of something than there may be.
+inline Error too_large(std::string message, std::string field, double limit, double actual) {
+  Error error = out_of_range(std::move(message), std::move(field), limit, actual);
+  error.code = ErrorCode::kTooLarge;
+  return error;
 }
 
 }  // namespace pointwright

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <numeric>
 
+#include "engine/editing/segment.h"
+
 namespace pointwright {
 namespace {
 

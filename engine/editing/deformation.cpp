@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "engine/core/check.h"
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/editing/deformation_map.h"
 #include "engine/editing/shape.h"
@@ -16,19 +16,11 @@ Error non_finite(const char* field) {
   return Error{.code = ErrorCode::kNonFinite, .message = "the number must be finite", .field = field};
 }
 
-Error beyond(const char* message, const char* field, double limit, double actual) {
-  return Error{.code = ErrorCode::kInvalidArgument,
-               .message = message,
-               .field = field,
-               .limit = limit,
-               .actual = actual};
-}
-
 Result<void> check_length(const Vec3d& v, const char* field, const char* message) {
   if (!v.allFinite()) return non_finite(field);
   const double length = v.stableNorm();
   if (length <= kMaxDeformationLength) return {};
-  return beyond(message, field, kMaxDeformationLength, length);
+  return out_of_range(message, field, kMaxDeformationLength, length);
 }
 
 Result<void> check_point(const Vec3d& point, const char* field) {
@@ -44,8 +36,8 @@ Result<void> check_axis(const Vec3d& axis) {
 Result<void> check_angle(double angle_rad) {
   if (!std::isfinite(angle_rad)) return non_finite("angle_rad");
   if (std::abs(angle_rad) <= kMaxDeformationAngle) return {};
-  return beyond("the angle must be at most 100 turns either way", "angle_rad", kMaxDeformationAngle,
-                angle_rad);
+  return out_of_range("the angle must be at most 100 turns either way", "angle_rad", kMaxDeformationAngle,
+                      angle_rad);
 }
 
 Result<void> validate_one(const Translation& translation) {
@@ -55,16 +47,16 @@ Result<void> validate_one(const Translation& translation) {
 Result<void> validate_one(const NormalOffset& offset) {
   if (!std::isfinite(offset.distance)) return non_finite("distance");
   if (std::abs(offset.distance) <= kMaxDeformationLength) return {};
-  return beyond("the distance must be at most 1e9 either way", "distance", kMaxDeformationLength,
-                offset.distance);
+  return out_of_range("the distance must be at most 1e9 either way", "distance", kMaxDeformationLength,
+                      offset.distance);
 }
 
 Result<void> validate_one(const TowardPoint& toward) {
   if (auto point = check_point(toward.target, "target"); !point) return point;
   if (!std::isfinite(toward.amount)) return non_finite("amount");
   if (toward.amount >= -kMaxDeformationFactor && toward.amount <= 1.0) return {};
-  return beyond("the amount must lie between -1000 and 1", "amount",
-                toward.amount < 0.0 ? -kMaxDeformationFactor : 1.0, toward.amount);
+  return out_of_range("the amount must lie between -1000 and 1", "amount",
+                      toward.amount < 0.0 ? -kMaxDeformationFactor : 1.0, toward.amount);
 }
 
 Result<void> validate_one(const Rotation& rotation) {
@@ -81,8 +73,8 @@ Result<void> validate_one(const Scaling& scaling) {
   const double greatest = scaling.factors.maxCoeff();
   if (least >= kLeast && greatest <= kMaxDeformationFactor) return {};
   const bool small = least < kLeast;
-  return beyond("the factors must lie between 0.001 and 1000", "factors",
-                small ? kLeast : kMaxDeformationFactor, small ? least : greatest);
+  return out_of_range("the factors must lie between 0.001 and 1000", "factors",
+                      small ? kLeast : kMaxDeformationFactor, small ? least : greatest);
 }
 
 Result<void> validate_one(const Twist& twist) {
@@ -92,8 +84,8 @@ Result<void> validate_one(const Twist& twist) {
   if (!std::isfinite(twist.length)) return non_finite("length");
   constexpr double kLeastLength = 1.0 / kMaxDeformationLength;
   if (twist.length >= kLeastLength && twist.length <= kMaxDeformationLength) return {};
-  return beyond("the length must lie between 1e-9 and 1e9", "length",
-                twist.length < kLeastLength ? kLeastLength : kMaxDeformationLength, twist.length);
+  return out_of_range("the length must lie between 1e-9 and 1e9", "length",
+                      twist.length < kLeastLength ? kLeastLength : kMaxDeformationLength, twist.length);
 }
 
 Mat3d cross_matrix(const Vec3d& a) {
@@ -188,8 +180,9 @@ bool needs_shape_operators(const Deformation& deformation) {
 Result<void> validate(const Deformation& deformation) {
   const std::size_t count = deformation.steps.size();
   if (count == 0 || count > kMaxDeformationSteps) {
-    return beyond("a deformation has 1 to 8 steps", "deformation.steps",
-                  count == 0 ? 1.0 : static_cast<double>(kMaxDeformationSteps), static_cast<double>(count));
+    return out_of_range("a deformation has 1 to 8 steps", "deformation.steps",
+                        count == 0 ? 1.0 : static_cast<double>(kMaxDeformationSteps),
+                        static_cast<double>(count));
   }
   for (std::size_t i = 0; i < count; ++i) {
     const ElementaryDeformation& one = deformation.steps[i];

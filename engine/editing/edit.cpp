@@ -5,6 +5,7 @@
 #include <string>
 
 #include "engine/core/check.h"
+#include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/editing/deformation_map.h"
 #include "engine/editing/edit_plan.h"
@@ -101,12 +102,10 @@ NormalStencil::Moved moved_level(const MultiresSurface& rest, std::size_t k, con
 
 Result<void> validate(const EditParams& params, const MultiresSurface& surface) {
   if (params.level > surface.band_count()) {
-    return Error{.code = ErrorCode::kInvalidArgument,
-                 .message = "level " + std::to_string(params.level) +
-                            " is beyond the surface's finest level, " + std::to_string(surface.band_count()),
-                 .field = "level",
-                 .limit = static_cast<double>(surface.band_count()),
-                 .actual = static_cast<double>(params.level)};
+    return out_of_range("level " + std::to_string(params.level) + " is beyond the surface's finest level, " +
+                            std::to_string(surface.band_count()),
+                        "level", static_cast<double>(surface.band_count()),
+                        static_cast<double>(params.level));
   }
   if (auto gains = validate(ReconstructParams{.level = params.level, .gains = params.gains}, surface); !gains)
     return gains;

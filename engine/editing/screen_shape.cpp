@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/editing/segment.h"
+
 namespace pointwright {
 namespace {
 
@@ -110,11 +112,7 @@ bool crosses(const Edge& edge, const Vec2d& point) {
 }
 
 bool near(const Edge& edge, const Vec2d& point, double width) {
-  const Vec2d along = edge.to - edge.from;
-  const Vec2d to_point = point - edge.from;
-  const double length_sq = along.squaredNorm();
-  const double s = length_sq > 0.0 ? std::clamp(to_point.dot(along) / length_sq, 0.0, 1.0) : 0.0;
-  return (to_point - s * along).squaredNorm() <= 0.25 * width * width;
+  return segment_distance_sq(edge.from, edge.to, point) <= 0.25 * width * width;
 }
 
 // The outline's answer from the edges that may count: edge_at(0) .. edge_at(count - 1).

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/editing/segment.h"
+
 namespace pointwright {
 namespace {
 
@@ -175,15 +177,6 @@ std::size_t vertex_count(const Shape& shape) {
   if (const auto* set = std::get_if<PointSet>(&shape)) return set->points.size();
   if (const auto* screen = std::get_if<ScreenShape>(&shape)) return outline_vertex_count(*screen);
   return 0;
-}
-
-double segment_distance_sq(const Vec3d& a, const Vec3d& b, const Vec3d& point) {
-  const Vec3d along = b - a;
-  const Vec3d to_point = point - a;
-  const double length_sq = along.squaredNorm();
-  // A segment without length is the ball around its vertex.
-  const double s = length_sq > 0.0 ? std::clamp(to_point.dot(along) / length_sq, 0.0, 1.0) : 0.0;
-  return (to_point - s * along).squaredNorm();
 }
 
 }  // namespace pointwright

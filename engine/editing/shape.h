@@ -61,7 +61,4 @@ bool contains(const Shape& shape, const Vec3d& point);
 /// outlines.
 std::size_t vertex_count(const Shape& shape);
 
-/// Squared distance from the point to the segment from a to b, which may be one point.
-double segment_distance_sq(const Vec3d& a, const Vec3d& b, const Vec3d& point);
-
 }  // namespace pointwright

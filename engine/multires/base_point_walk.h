@@ -33,7 +33,7 @@ class BasePointWalk {
 
   /// Newton steps for the samples [begin, begin + start.size()), the first from sample start[i] of Q, each
   /// until it moves less than the tolerance or walk_limit is reached.
-  /// Cost: O(iterations k) a sample; about 400 bytes of state for a sample of the block
+  /// Cost: O(iterations k) a sample; 64 bytes of state for a sample of the block
   void run(const Points& position, std::size_t begin, std::span<const std::uint32_t> start,
            std::span<BasePoint> found);
 

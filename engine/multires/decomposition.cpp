@@ -117,11 +117,8 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
   }
   constexpr std::size_t kMostBaseSamples = (std::size_t{1} << 31) / kMaxPlaneCandidates;  // 32-bit indices
   if (base.position.size() > kMostBaseSamples) {
-    return Error{.code = ErrorCode::kTooLarge,
-                 .message = "the base of a band has at most 85 million samples",
-                 .field = "scales",
-                 .limit = static_cast<double>(kMostBaseSamples),
-                 .actual = static_cast<double>(base.position.size())};
+    return too_large("the base of a band has at most 85 million samples", "scales",
+                     static_cast<double>(kMostBaseSamples), static_cast<double>(base.position.size()));
   }
   const std::size_t n = position.size();
   Decomposition result;

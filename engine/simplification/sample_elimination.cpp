@@ -122,6 +122,8 @@ class Eliminator {
   [[nodiscard]] bool is_cut_short() const;
   void weigh_pairs();
   void play_round();
+  template <typename Wanted>
+  std::vector<std::vector<std::uint32_t>> active_where(const Wanted& wanted) const;
   std::vector<std::vector<std::uint32_t>> find_leaving();
   void take_out(const std::vector<std::vector<std::uint32_t>>& leaving);
   void keep_active();
@@ -268,30 +270,35 @@ void Eliminator::weigh_pairs() {
       kParallelBlock, context_);
 }
 
-// The samples that go before all their neighbours.
-std::vector<std::vector<std::uint32_t>> Eliminator::find_leaving() {
-  std::vector<std::vector<std::uint32_t>> leaving(blocks_of(active_.size()));
+// Of the samples that may still go, those that `wanted` says yes to, parallel block by parallel block.
+template <typename Wanted>
+std::vector<std::vector<std::uint32_t>> Eliminator::active_where(const Wanted& wanted) const {
+  std::vector<std::vector<std::uint32_t>> found(blocks_of(active_.size()));
   parallel_for(
       active_.size(),
       [&](std::size_t begin, std::size_t end) {
-        std::vector<std::uint32_t>& here = leaving[begin / kParallelBlock];
+        std::vector<std::uint32_t>& here = found[begin / kParallelBlock];
         for (std::size_t a = begin; a < end; ++a) {
-          const std::uint32_t i = active_[a];
-          const std::uint32_t before = obstacle_[i];
-          if (before != i && is_left_[before] != 0 && goes_before(before, i)) continue;
-          const std::span<const std::uint32_t> row = neighbors(i);
-          const auto found = std::find_if(row.begin(), row.end(), [&](std::uint32_t other) {
-            return is_left_[other] != 0 && goes_before(other, i);
-          });
-          if (found == row.end()) {
-            here.push_back(i);
-          } else {
-            obstacle_[i] = *found;
-          }
+          if (wanted(active_[a])) here.push_back(active_[a]);
         }
       },
       kParallelBlock, context_);
-  return leaving;
+  return found;
+}
+
+// The samples that go before all their neighbours.
+std::vector<std::vector<std::uint32_t>> Eliminator::find_leaving() {
+  return active_where([this](std::uint32_t i) {
+    const std::uint32_t before = obstacle_[i];
+    if (before != i && is_left_[before] != 0 && goes_before(before, i)) return false;
+    const std::span<const std::uint32_t> row = neighbors(i);
+    const auto found = std::find_if(row.begin(), row.end(), [&](std::uint32_t other) {
+      return is_left_[other] != 0 && goes_before(other, i);
+    });
+    if (found == row.end()) return true;
+    obstacle_[i] = *found;
+    return false;
+  });
 }
 
 void Eliminator::take_out(const std::vector<std::vector<std::uint32_t>>& leaving) {
@@ -323,18 +330,8 @@ void Eliminator::take_out(const std::vector<std::vector<std::uint32_t>>& leaving
 }
 
 void Eliminator::keep_active() {
-  std::vector<std::vector<std::uint32_t>> active(blocks_of(active_.size()));
-  parallel_for(
-      active_.size(),
-      [&](std::size_t begin, std::size_t end) {
-        std::vector<std::uint32_t>& here = active[begin / kParallelBlock];
-        for (std::size_t a = begin; a < end; ++a) {
-          const std::uint32_t i = active_[a];
-          if (is_left_[i] != 0 && weight_[i] >= threshold_) here.push_back(i);
-        }
-      },
-      kParallelBlock, context_);
-  active_ = joined(active);
+  active_ =
+      joined(active_where([this](std::uint32_t i) { return is_left_[i] != 0 && weight_[i] >= threshold_; }));
 }
 
 void Eliminator::play_round() {

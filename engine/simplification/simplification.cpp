@@ -216,11 +216,8 @@ Result<Simplification> simplify(const Points& position, const Points& normal, co
   const std::size_t n = position.size();
   POINTWRIGHT_CHECK(graph.count == n && normal.size() == n, "normals and graph must be of these points");
   if (n > kMaxSamples) {
-    return Error{.code = ErrorCode::kTooLarge,
-                 .message = "too many samples to simplify at once",
-                 .field = "position",
-                 .limit = static_cast<double>(kMaxSamples),
-                 .actual = static_cast<double>(n)};
+    return too_large("too many samples to simplify at once", "position", static_cast<double>(kMaxSamples),
+                     static_cast<double>(n));
   }
   Simplification result{.placement = params.placement};
   result.record.neighbor_first.assign(1, 0);

@@ -152,11 +152,8 @@ Result<std::vector<std::uint32_t>> subsample(const Points& position, const Point
   const std::size_t n = position.size();
   POINTWRIGHT_CHECK(normal.empty() || normal.size() == n, "normals must be of these points");
   if (n > kMaxSamples) {
-    return Error{.code = ErrorCode::kTooLarge,
-                 .message = "too many samples to choose from at once",
-                 .field = "position",
-                 .limit = static_cast<double>(kMaxSamples),
-                 .actual = static_cast<double>(n)};
+    return too_large("too many samples to choose from at once", "position", static_cast<double>(kMaxSamples),
+                     static_cast<double>(n));
   }
   const std::size_t wanted =
       std::visit([n](const auto& target) { return kept_of(target, n); }, params.target);

@@ -231,6 +231,8 @@ Outcome<Done> Session::ensure_level(std::uint32_t level) {
   if (!state) return protocol::to_problem(state.error());
   note_time("derive_levels", begin);
   document.surface = std::move(state).value();
+  last_preview_.reset();
+  drag_.reset();  // it was of the surface before
   history_->replace_current(document.surface);
   publish(std::move(document));
   return Done{};

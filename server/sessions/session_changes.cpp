@@ -45,6 +45,9 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
   if (auto open = check_open(); !open.ok()) return open.problem();
   if (auto current = check_revision(expected); !current.ok()) return current.problem();
   const auto begin = SteadyClock::now();
+  // What a drag shares belongs to the regions as they were.
+  last_preview_.reset();
+  drag_.reset();
   const SharedDocument before = document();
   const Painting& painting = before->painting(kind);
   const std::size_t kept = append ? painting.operations->size() : 0;

@@ -68,12 +68,8 @@ TEST_CASE("distances are those of brute force, exactly, for any radii, on every 
       CHECK(region.size() == balls);
       CHECK(region.center(balls - 1) == centers[balls - 1]);
       CHECK(region.radius(0) == radii[0]);
-      const SimdLevel before = simd_level();
-      for (const SimdLevel level : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-        set_simd_level(level);
-        check_exact(region, centers, radii, test::random_points(333, 13, 1.5F));
-      }
-      set_simd_level(before);
+      test::on_every_instruction_set(
+          [&] { check_exact(region, centers, radii, test::random_points(333, 13, 1.5F)); });
     }
   }
 }

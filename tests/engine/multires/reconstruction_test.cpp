@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/parallel.h"
-#include "engine/core/simd_dispatch.h"
 #include "engine/multires/hierarchy.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -224,16 +223,9 @@ TEST_CASE("rebuilding has the same bytes for any thread count and instruction se
   for (std::size_t i = 0; i < rest.sample_count(); ++i)
     bent.position.set(i, bent.position[i] * (1.0F + 0.3F * bent.position[i].x()));
   const ReconstructParams params{.gains = {1.5F, 0.5F}};
-  MultiresSurface reference;
-  with_threads(1, [&] { reference = rebuilt(bumpy(), bent, params); });
-  for (const int threads : {2, 8})
-    with_threads(threads, [&] { CHECK(rebuilt(bumpy(), bent, params).levels == reference.levels); });
-  const SimdLevel best = best_simd_level();
-  for (const SimdLevel level : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-    set_simd_level(level);
-    CHECK(rebuilt(bumpy(), bent, params).levels == reference.levels);
-  }
-  set_simd_level(best);
+  for_all_machines(
+      [&] { return rebuilt(bumpy(), bent, params); },
+      [](const MultiresSurface& one, const MultiresSurface& other) { CHECK(other.levels == one.levels); });
 }
 
 TEST_CASE("a cancelled rebuilding says so") {

@@ -9,8 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "engine/core/parallel.h"
-#include "engine/core/simd_dispatch.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -355,25 +354,22 @@ TEST_CASE("every instruction set and thread count gives the same bytes") {
   const NeighborGraph graph = build_neighbor_graph(points, 10);
   const auto ball = build_radius_graph(points, {.radius = 0.05F});
   REQUIRE(ball.ok());
-  const SimdLevel before = simd_level();
-  set_simd_level(SimdLevel::kBase);
-  Points reference;
-  const std::size_t degenerate = estimate_normals(points, graph, {}, reference);
-  Points ball_reference;
-  estimate_normals(points, ball.value(), {}, ball_reference);
-  for (const SimdLevel level : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-    set_simd_level(level);
-    for (const int threads : {1, 2, 8}) {
-      with_threads(threads, [&] {
-        Points normal;
-        CHECK(estimate_normals(points, graph, {}, normal) == degenerate);
-        CHECK(normal == reference);
-        estimate_normals(points, ball.value(), {}, normal);
-        CHECK(normal == ball_reference);
+  struct Estimated {
+    Points normal, ball_normal;
+    std::size_t degenerate = 0;
+  };
+  for_all_machines(
+      [&] {
+        Estimated made;
+        made.degenerate = estimate_normals(points, graph, {}, made.normal);
+        estimate_normals(points, ball.value(), {}, made.ball_normal);
+        return made;
+      },
+      [](const Estimated& one, const Estimated& other) {
+        CHECK(other.degenerate == one.degenerate);
+        CHECK(other.normal == one.normal);
+        CHECK(other.ball_normal == one.ball_normal);
       });
-    }
-  }
-  set_simd_level(before);
 }
 
 TEST_CASE("a sigma out of range or a graph of other points is a logic error") {

@@ -8,9 +8,8 @@
 #include <tuple>
 #include <utility>
 
-#include "engine/core/parallel.h"
-#include "engine/core/simd_dispatch.h"
 #include "engine/normals/estimation.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -164,20 +163,11 @@ TEST_CASE("the forest does not depend on threads or instruction sets") {
   const Points points = torus(40'003, 1.0, 0.4, Sampling::kRandom).position;
   const Points normals = random_normals(points.size(), 7);
   const NeighborGraph graph = build_neighbor_graph(points, 10);
-  const SimdLevel before = simd_level();
-  set_simd_level(SimdLevel::kBase);
-  const SidedForest reference = span_normals(points, graph, normals);
-  for (const SimdLevel level : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-    set_simd_level(level);
-    for (const int threads : {1, 2, 8}) {
-      with_threads(threads, [&] {
-        const SidedForest forest = span_normals(points, graph, normals);
-        CHECK(forest.root == reference.root);
-        CHECK(forest.opposed == reference.opposed);
-      });
-    }
-  }
-  set_simd_level(before);
+  for_all_machines([&] { return span_normals(points, graph, normals); },
+                   [](const SidedForest& one, const SidedForest& other) {
+                     CHECK(other.root == one.root);
+                     CHECK(other.opposed == one.opposed);
+                   });
 }
 
 TEST_CASE("a cancelled forest is empty") {

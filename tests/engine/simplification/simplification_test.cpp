@@ -8,10 +8,9 @@
 #include <numbers>
 #include <vector>
 
-#include "engine/core/parallel.h"
-#include "engine/core/simd_dispatch.h"
 #include "engine/normals/estimation.h"
 #include "engine/spatial/kd_tree.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/surfaces.h"
 
 namespace pointwright {
@@ -324,16 +323,9 @@ TEST_CASE("contractions are undone to any count, bit by bit") {
 TEST_CASE("any number of threads and any instruction set gives the same bytes") {
   const Surface surface = with_noise(torus(30'000, 1.0, 0.4, Sampling::kRandom), 0.001);
   const SimplifyParams params{.target = KeepCount{2'000}};
-  const Simplification reference = simplified(surface, params);
-  for (const int threads : {1, 2, 8}) {
-    with_threads(threads, [&] { CHECK(same_bits(simplified(surface, params), reference)); });
-  }
-  const SimdLevel level = simd_level();
-  for (const SimdLevel other : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-    set_simd_level(other);
-    CHECK(same_bits(simplified(surface, params), reference));
-  }
-  set_simd_level(level);
+  for_all_machines(
+      [&] { return simplified(surface, params); },
+      [](const Simplification& one, const Simplification& other) { CHECK(same_bits(other, one)); });
 }
 
 TEST_CASE("the scale of the model does not matter") {

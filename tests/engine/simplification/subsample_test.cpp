@@ -10,9 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/core/parallel.h"
-#include "engine/core/simd_dispatch.h"
 #include "engine/spatial/kd_tree.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/random_points.h"
 #include "tests/support/spacing.h"
 #include "tests/support/surfaces.h"
@@ -191,16 +190,8 @@ TEST_CASE("any number of threads and any instruction set chooses the same sample
                               parallel_sheets(120, 0.01, 0.002, Sampling::kRandom)};
   for (const Surface& surface : surfaces) {
     for (const std::size_t count : {600, 12'000}) {
-      const std::vector<std::uint32_t> reference = chosen(surface, count);
-      for (const int threads : {1, 2, 8}) {
-        with_threads(threads, [&] { CHECK(chosen(surface, count) == reference); });
-      }
-      const SimdLevel level = simd_level();
-      for (const SimdLevel other : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-        set_simd_level(other);
-        CHECK(chosen(surface, count) == reference);
-      }
-      set_simd_level(level);
+      for_all_machines([&] { return chosen(surface, count); },
+                       [](const auto& one, const auto& other) { CHECK(other == one); });
     }
   }
 }

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "engine/core/parallel.h"
-#include "engine/core/simd_dispatch.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/random_points.h"
 #include "tests/support/surfaces.h"
 
@@ -199,14 +199,8 @@ TEST_CASE("every instruction set finds the same graph") {
   Points points = with_noise(torus(20'003, 1.0, 0.4, Sampling::kRandom), 0.003).position;
   for (std::size_t i = 0; i < 2000; ++i) points.set(7 * i + 1, points[7 * i]);
   points = coherent(points);
-  const SimdLevel before = simd_level();
-  set_simd_level(SimdLevel::kBase);
-  const NeighborGraph reference = build_neighbor_graph(points, 10);
-  for (const SimdLevel level : {SimdLevel::kV3, SimdLevel::kV4}) {
-    set_simd_level(level);
-    CHECK(build_neighbor_graph(points, 10).lanes == reference.lanes);
-  }
-  set_simd_level(before);
+  for_all_machines([&] { return build_neighbor_graph(points, 10).lanes; },
+                   [](const auto& one, const auto& other) { CHECK(other == one); });
 }
 
 TEST_CASE("a cancelled graph returns at once") {

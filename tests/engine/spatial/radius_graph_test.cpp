@@ -7,8 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "engine/core/parallel.h"
-#include "engine/core/simd_dispatch.h"
+#include "tests/support/all_machines.h"
 #include "tests/support/random_points.h"
 #include "tests/support/surfaces.h"
 
@@ -137,23 +136,13 @@ TEST_CASE("radii and limits out of range are refused by name") {
 
 TEST_CASE("the radius graph does not depend on threads or instruction sets") {
   const Points points = with_noise(torus(20'003, 1.0, 0.4, Sampling::kRandom), 0.003).position;
-  const SimdLevel before = simd_level();
-  set_simd_level(SimdLevel::kBase);
-  RadiusGraph reference;
-  with_threads(1, [&] { reference = graph_of(points, 0.05F, 20); });
-  CHECK(reference.cut_count > 0);
-  for (const SimdLevel level : {SimdLevel::kBase, SimdLevel::kV3, SimdLevel::kV4}) {
-    set_simd_level(level);
-    for (const int threads : {1, 2, 8}) {
-      with_threads(threads, [&] {
-        const RadiusGraph graph = graph_of(points, 0.05F, 20);
-        CHECK(graph.first == reference.first);
-        CHECK(graph.neighbors == reference.neighbors);
-        CHECK(graph.cut_count == reference.cut_count);
-      });
-    }
-  }
-  set_simd_level(before);
+  for_all_machines([&] { return graph_of(points, 0.05F, 20); },
+                   [](const RadiusGraph& one, const RadiusGraph& other) {
+                     CHECK(one.cut_count > 0);
+                     CHECK(other.first == one.first);
+                     CHECK(other.neighbors == one.neighbors);
+                     CHECK(other.cut_count == one.cut_count);
+                   });
 }
 
 TEST_CASE("a cancelled radius graph is an error") {
