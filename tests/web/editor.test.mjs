@@ -22,6 +22,11 @@ import {
 const frontCamera = { position: [0, 0, 6], target: [0, 0, 0], up: [0, 1, 0] };
 startAroundTests();
 
+/** Types numbers into the fields of these labels, in this order. */
+async function fill(form, numbers) {
+  for (const [label, value] of Object.entries(numbers)) await form.getByLabel(label).fill(String(value));
+}
+
 /** A page with a session of its own, seen from the front, at rest. */
 async function openEditor(samples = 12_000) {
   const session = await createSession(service, samples);
@@ -221,10 +226,7 @@ test("the whole loop works by the keyboard: shapes and a rotation by numbers", {
   const form = page.locator("form.shape-form");
   const paint = async (region, x) => {
     await form.getByLabel("Region").selectOption(region);
-    await form.getByLabel("Centre X").fill(String(x));
-    await form.getByLabel("Centre Y").fill("0");
-    await form.getByLabel("Centre Z").fill("0");
-    await form.getByLabel("Radius").fill("0.6");
+    await fill(form, { "Centre X": x, "Centre Y": 0, "Centre Z": 0, Radius: 0.6 });
     const { revision } = await state();
     await form.getByRole("button", { name: "Apply to region" }).press("Enter");
     await waitForRevision(page, revision + 1);
@@ -234,13 +236,8 @@ test("the whole loop works by the keyboard: shapes and a rotation by numbers", {
   const { regions, revision } = await state();
   assert.ok(regions.zero.samples > 0 && regions.one.samples > 0);
   await page.locator('[data-tool="rotate"]').press("Enter");
-  await page.getByLabel("Axis X").fill("0");
-  await page.getByLabel("Axis Y").fill("0");
-  await page.getByLabel("Axis Z").fill("1");
-  await page.getByLabel("Pivot X").fill("0");
-  await page.getByLabel("Pivot Y").fill("0");
-  await page.getByLabel("Pivot Z").fill("0");
-  await page.getByLabel("Angle").fill("30");
+  await fill(page, { "Axis X": 0, "Axis Y": 0, "Axis Z": 1 });
+  await fill(page, { "Pivot X": 0, "Pivot Y": 0, "Pivot Z": 0, Angle: 30 });
   await page.getByLabel("Angle").press("Enter");
   await waitForRevision(page, revision + 1);
   const { edits: records } = await edits();
@@ -266,11 +263,7 @@ test("a twist by numbers: preview, blend and detail, recorded edit", { timeout }
   assert.ok(length > 1.7 && length < 2.2, `over ${length}`);
   // About a line above the capsule, half a turn over the whole height lifts the right cap over it.
   await page.keyboard.press("x");
-  await page.getByLabel("Pivot X").fill("-1");
-  await page.getByLabel("Pivot Y").fill("0.4");
-  await page.getByLabel("Pivot Z").fill("0");
-  await page.getByLabel("Over a length of").fill("2");
-  await page.getByLabel("Angle").fill("180");
+  await fill(page, { "Pivot X": -1, "Pivot Y": 0.4, "Pivot Z": 0, "Over a length of": 2, Angle: 180 });
   await page.getByLabel("Blend").selectOption("cosine");
   await page.waitForFunction(() => globalThis.pointwright.status.lastSequence > 0, null, { timeout: waitMs });
   await waitForIdle(page, waitMs);
