@@ -50,18 +50,26 @@ void print_row(const std::string& name, const std::string& order, const Contest&
   report.record(name + "." + order + "." + contest.name, "us/point", static_cast<double>(samples), us);
 }
 
+// What every library enters of one kind, each writing to `result`.
+template <typename Entry, typename Answer>
+std::vector<Contest> contests_of(std::span<const Library> libraries, std::vector<Entry> Library::*entries,
+                                 const Points& points, Answer& result) {
+  std::vector<Contest> contests;
+  for (const Library& library : libraries) {
+    for (const Entry& entry : library.*entries) {
+      contests.push_back(
+          {entry.name, [&result, work = entry.load(points, kNeighbors)] { work(result); }, {}});
+    }
+  }
+  return contests;
+}
+
 void search_in(const std::string& order, std::span<const Library> libraries, const Points& points,
                bench::BenchReport& report) {
   const std::string name = "knn.k10";
   if (!report.wants(name)) return;
   NeighborLists lists(points.size() * kNeighbors);
-  std::vector<Contest> contests;
-  for (const Library& library : libraries) {
-    for (const NeighborSearch& search : library.searches) {
-      contests.push_back(
-          {search.name, [&lists, work = search.load(points, kNeighbors)] { work(lists); }, {}});
-    }
-  }
+  std::vector<Contest> contests = contests_of(libraries, &Library::searches, points, lists);
   take_turns(contests);
   std::printf("\n%u nearest neighbours of %zu samples, %s order\n", kNeighbors, points.size(), order.c_str());
   for (Contest& contest : contests) {
@@ -75,13 +83,7 @@ void normals_in(const std::string& order, std::span<const Library> libraries, co
   const std::string name = "normals.k10";
   if (!report.wants(name)) return;
   Points normal(points.size());
-  std::vector<Contest> contests;
-  for (const Library& library : libraries) {
-    for (const NormalEstimator& estimator : library.estimators) {
-      contests.push_back(
-          {estimator.name, [&normal, work = estimator.load(points, kNeighbors)] { work(normal); }, {}});
-    }
-  }
+  std::vector<Contest> contests = contests_of(libraries, &Library::estimators, points, normal);
   take_turns(contests);
   std::printf("\nnormals of %zu samples over %u neighbours, %s order\n", points.size(), kNeighbors,
               order.c_str());
