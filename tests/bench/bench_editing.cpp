@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/editing/ball_cover.h"
 #include "engine/editing/edit_plan.h"
 #include "engine/editing/painting.h"
 #include "tests/bench/benchmarks.h"
@@ -107,10 +108,26 @@ void bench_region_query(BenchReport& report) {
   });
 }
 
+// Half of the samples, with a ragged border.
+void bench_cover(BenchReport& report, const Size& size) {
+  const std::string name = std::string("cover.") + size.name;
+  if (!report.wants(name)) return;
+  const Cloud cloud = ordered_scan(size.samples);
+  SampleMask members(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Vec3f p = cloud.position[i];
+    const float border = 0.02F * std::sin(90.0F * p.y()) + 0.02F * std::sin(170.0F * p.z() + 30.0F * p.y());
+    members[i] = p.x() > border ? 1 : 0;
+  }
+  report.time(name, "ms", static_cast<double>(cloud.size()),
+              [&] { ball_cover(cloud.position, members, cloud.origin); });
+}
+
 }  // namespace
 
 void bench_editing(BenchReport& report) {
   bench_region_query(report);
+  for (const Size& size : {Size{"150k", 150'000}, Size{"2m", 2'000'000}}) bench_cover(report, size);
   for (const Size& size : {Size{"148k", 148'000}, Size{"437k", 437'645}, Size{"2m", 2'000'000}}) {
     bench_size(report, size);
   }
