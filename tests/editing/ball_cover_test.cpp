@@ -3,7 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <numbers>
+#include <initializer_list>
 #include <vector>
 
 #include "engine/editing/painting.h"
@@ -86,7 +86,7 @@ TEST_CASE("a cover is the same on any machine") {
 
 TEST_CASE("any number of samples, in one place, on a line, or too near for floats to square, has a cover") {
   const Vec3d origin(10.0, 0.0, 0.0);
-  for (const std::size_t n : {0, 1, 2, 15, 16, 17, 300}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{0, 1, 2, 15, 16, 17, 300}) {
     const Points one_place = test::identical(n, {1.0F, 2.0F, 3.0F});
     const auto everyone = mask_of(one_place, [](auto, auto) { return true; });
     CHECK(check_exact(one_place, everyone, origin) == (n > 0 ? 1 : 0));
@@ -113,8 +113,10 @@ TEST_CASE("members beyond what one point set holds go into several") {
   // Every other sample of a lattice: nobody's ball holds a second member.
   const std::size_t side = 460;
   Points lattice(side * side);
-  for (std::size_t i = 0; i < lattice.size(); ++i)
-    lattice.set(i, {static_cast<float>(i % side), static_cast<float>(i / side), 0.0F});
+  for (std::size_t i = 0; i < lattice.size(); ++i) {
+    const std::size_t row = i / side;
+    lattice.set(i, {static_cast<float>(i % side), static_cast<float>(row), 0.0F});
+  }
   const SampleMask members =
       mask_of(lattice, [&](std::size_t i, auto) { return (i % side + i / side) % 2 == 0; });
   const std::vector<PointSet> cover = ball_cover(lattice, members, Vec3d::Zero());
