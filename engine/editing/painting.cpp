@@ -8,9 +8,17 @@
 #include "engine/core/parallel.h"
 #include "engine/editing/culled_shape.h"
 #include "engine/editing/selection.h"
+#include "engine/editing/visibility.h"
 
 namespace pointwright {
 namespace {
+
+std::uint8_t bit_of(RegionKind kind) {
+  return static_cast<std::uint8_t>(kind);
+}
+std::uint8_t other_bit(RegionKind kind) {
+  return bit_of(kind == RegionKind::kZero ? RegionKind::kOne : RegionKind::kZero);
+}
 
 // Samples that share one culling decision.
 constexpr std::size_t kPaintBlock = 128;
@@ -193,36 +201,51 @@ Result<void> validate(const PaintOperation& operation) {
   return check_facing(operation);
 }
 
-std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface, Marks& marks,
-                  const ExecutionContext* context) {
+bool depends_on_sampling(const PaintOperation& operation) {
+  if (has_shape(operation.mode)) return operation.facing || depends_on_sampling(operation.shape);
+  return has_distance(operation.mode) || operation.mode == PaintMode::kFlood;
+}
+
+SampleMask covered_samples(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface,
+                           const Marks& marks, const ExecutionContext* context) {
   const std::size_t n = surface.position.size();
   POINTWRIGHT_CHECK(marks.size() == n, "one mark per sample");
-  POINTWRIGHT_CHECK(!operation.facing || surface.normal.size() == n, "one normal per sample");
-  const auto own = static_cast<std::uint8_t>(kind);
-  const auto other =
-      static_cast<std::uint8_t>(kind == RegionKind::kZero ? RegionKind::kOne : RegionKind::kZero);
-  const Changes changes = changes_of(operation.mode);
-  SampleMask chosen;
-  if (has_distance(operation.mode)) chosen = at_border(operation, own, surface.position, marks, context);
+  if (has_distance(operation.mode))
+    return at_border(operation, bit_of(kind), surface.position, marks, context);
   if (operation.mode == PaintMode::kFlood) {
     POINTWRIGHT_CHECK(surface.graph != nullptr && surface.graph->count == n, "the graph of the samples");
     SampleMask blocked;
-    if (operation.flood.stop_at_other) blocked = marked(marks, other);
-    chosen = flood_fill(surface, operation.flood, blocked, context);
+    if (operation.flood.stop_at_other) blocked = marked(marks, other_bit(kind));
+    return flood_fill(surface, operation.flood, blocked, context);
   }
-  std::optional<ShapeCover> shape;
-  if (has_shape(operation.mode)) shape.emplace(operation, surface);
+  SampleMask covered(n, 0);
+  if (!has_shape(operation.mode)) return covered;
+  POINTWRIGHT_CHECK(!operation.facing || surface.normal.size() == n, "one normal per sample");
+  const ShapeCover shape(operation, surface);
+  parallel_for(
+      n,
+      [&](std::size_t begin, std::size_t end) { shape.cover(begin, end, covered.data() + begin, context); },
+      kParallelBlock, context);
+  const auto* screen = std::get_if<ScreenShape>(&operation.shape);
+  if (screen != nullptr && screen->visible) {
+    const SampleMask visible = visible_samples(*screen, surface, context);
+    std::ranges::transform(covered, visible, covered.begin(),
+                           [](std::uint8_t a, std::uint8_t b) { return static_cast<std::uint8_t>(a & b); });
+  }
+  return covered;
+}
 
-  return parallel_sum<std::size_t>(n, 0, [&](std::size_t begin, std::size_t end) {
+std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface, Marks& marks,
+                  const ExecutionContext* context) {
+  const SampleMask covered = covered_samples(operation, kind, surface, marks, context);
+  const Changes changes = changes_of(operation.mode);
+  return parallel_sum<std::size_t>(marks.size(), 0, [&](std::size_t begin, std::size_t end) {
     std::size_t changed = 0;
-    SampleMask covered(end - begin, 0);
-    if (!chosen.empty())
-      std::copy_n(chosen.begin() + static_cast<std::ptrdiff_t>(begin), end - begin, covered.begin());
-    if (shape) shape->cover(begin, end, covered.data(), context);
     if (context != nullptr && context->is_cancelled()) return changed;
     for (std::size_t i = begin; i < end; ++i) {
-      const Change change = covered[i - begin] != 0 ? changes.covered : changes.uncovered;
-      const std::uint8_t mark = changed_mark(marks[i], change, own, other, operation.steal);
+      const Change change = covered[i] != 0 ? changes.covered : changes.uncovered;
+      const std::uint8_t mark =
+          changed_mark(marks[i], change, bit_of(kind), other_bit(kind), operation.steal);
       changed += mark != marks[i] ? 1 : 0;
       marks[i] = mark;
     }
@@ -231,9 +254,8 @@ std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintS
 }
 
 std::size_t count_marked(const Marks& marks, RegionKind kind) {
-  const auto bit = static_cast<std::uint8_t>(kind);
-  return static_cast<std::size_t>(
-      std::count_if(marks.begin(), marks.end(), [bit](std::uint8_t mark) { return (mark & bit) != 0; }));
+  return static_cast<std::size_t>(std::count_if(
+      marks.begin(), marks.end(), [bit = bit_of(kind)](std::uint8_t mark) { return (mark & bit) != 0; }));
 }
 
 }  // namespace pointwright

@@ -18,6 +18,8 @@ enum class RegionKind : std::uint8_t { kZero = 1, kOne = 2 };
 
 /// Per sample, which regions it is painted with: RegionKind bits. N entries.
 using Marks = std::vector<std::uint8_t>;
+/// A set of samples: one entry each, 0 or 1.
+using SampleMask = std::vector<std::uint8_t>;
 
 enum class PaintMode {
   kAdd,        ///< samples in the shape join the region
@@ -62,13 +64,23 @@ struct PaintOperation {
 /// flood are "seed", "angle" and "radius".
 Result<void> validate(const PaintOperation& operation);
 
+/// Whether what the operation covers follows from where the samples stand, not from their places in model
+/// space alone: on another sampling, or once the surface moved, it may cover another part of the surface.
+bool depends_on_sampling(const PaintOperation& operation);
+
 /// The surface that is painted: its columns belong to the caller.
 struct PaintSurface {
   const Points& position;  ///< relative to `origin`
   const Points& normal;    ///< read only for `facing` and for angles
   const Vec3d& origin;
-  const NeighborGraph* graph = nullptr;  ///< of its samples; read only for kFlood
+  const NeighborGraph* graph = nullptr;  ///< of its samples; read only for kFlood and what is `visible`
 };
+
+/// The samples that an operation covers: those in its shape that pass its filters, those that growing takes
+/// in, shrinking gives up or a flood reaches; none where the mode covers nothing. Pre, Cost, Determinism,
+/// Cancels: those of paint()
+SampleMask covered_samples(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface,
+                           const Marks& marks, const ExecutionContext* context = nullptr);
 
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
 /// Pre:         validate(operation)

@@ -172,6 +172,11 @@ bool contains(const Shape& shape, const Vec3d& point) {
   return std::visit([&](const auto& one) { return contains_one(one, point); }, shape);
 }
 
+bool depends_on_sampling(const Shape& shape) {
+  const auto* screen = std::get_if<ScreenShape>(&shape);
+  return screen != nullptr && screen->visible;
+}
+
 std::size_t vertex_count(const Shape& shape) {
   if (const auto* stroke = std::get_if<Stroke>(&shape)) return stroke->vertices.size();
   if (const auto* set = std::get_if<PointSet>(&shape)) return set->points.size();

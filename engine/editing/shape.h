@@ -57,6 +57,9 @@ Result<void> validate(const Shape& shape);
 /// sets and outlines.
 bool contains(const Shape& shape, const Vec3d& point);
 
+/// Whether the shape is a choice among samples, not a volume: see PaintOperation's depends_on_sampling().
+bool depends_on_sampling(const Shape& shape);
+
 /// Vertices that the shape counts with against the limit of a painting: those of strokes, point sets and
 /// outlines.
 std::size_t vertex_count(const Shape& shape);

@@ -93,6 +93,8 @@ ScreenShape read_screen(ObjectReader& object) {
     const auto numbers = read_numbers(*view, object.pointer_to("view"), object.errors(), screen.view.size());
     std::ranges::copy(numbers, screen.view.begin());
   }
+  if (const Json* const visible = object.optional("visible"))
+    screen.visible = read_bool(*visible, object.pointer_to("visible"), object.errors()).value_or(false);
   const Json* const member = object.required("outline");
   if (member == nullptr) return screen;
   ObjectReader outline(*member, object.pointer_to("outline"), object.errors());
@@ -235,6 +237,7 @@ void put_members(const ScreenShape& screen, JsonDocument& document) {
   JsonDocument outline{{"type", kOutlineNames[screen.outline.index()]}};
   std::visit([&](const auto& each) { put_outline(each, outline); }, screen.outline);
   document["outline"] = std::move(outline);
+  if (screen.visible) document["visible"] = true;
 }
 
 }  // namespace

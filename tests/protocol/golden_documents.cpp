@@ -92,7 +92,6 @@ std::vector<PaintOperation> operations() {
            .shape = HalfSpace{.point = Vec3d(0.0, 0.05, 0.0), .normal = Vec3d(0.0, -1.0, 0.0)}},
           {.mode = PaintMode::kAdd,
            .shape = Stroke{.vertices = {Vec3d(0.1, 0.1, 0.05), Vec3d(0.11, 0.1, 0.05)}, .radius = 0.004},
-           .facing = Vec3d(0.0, 0.0, 1.0),
            .steal = true}};
 }
 

@@ -135,6 +135,13 @@ TEST_CASE("screen shapes have a view of 16 numbers and one outline") {
   CHECK(screen.view[15] == 5.0);
   CHECK(std::get<ScreenPolyline>(screen.outline).vertices[1] == Vec2d(1, 2));
   CHECK(std::get<ScreenPolyline>(screen.outline).width == 0.25);
+  CHECK_FALSE(screen.visible);
+  const std::string ellipse = R"(,"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]})";
+  const auto seen =
+      accepted(R"({"mode":"set","shape":{"type":"screen",)" + view + ellipse + R"(,"visible":true}})",
+               parse_paint_operation);
+  CHECK(std::get<ScreenShape>(seen.shape).visible);
+  CHECK(faults(view + ellipse + R"(,"visible":1)") == Pointers{"/shape/visible"});
   CHECK(faults(view) == Pointers{"/shape/outline"});
   CHECK(faults(R"("view":[1,2],"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]})") ==
         Pointers{"/shape/view"});
@@ -333,7 +340,7 @@ TEST_CASE("what was read is written back and read again to the bit") {
        R"({"mode":"add","shape":{"type":"points","points":[[0.1,0.0,2.0]],"radius":0.5}})",
        R"({"mode":"add","shape":{"type":"points","points":[[0.1,0.0,2.0],[1.0,0.0,0.0]],"radii":[0.5,0.25]}})",
        R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"polygon","vertices":[[0.0,0.1],[1.0,0.0],[0.5,1.0]]}}})",
-       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"ellipse","center":[0.0,0.1],"half_axes":[1.0,0.3]}}})",
+       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"ellipse","center":[0.0,0.1],"half_axes":[1.0,0.3]},"visible":true}})",
        R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"polyline","vertices":[[0.0,0.1]],"width":0.3}},"steal":true})",
        R"({"mode":"flood","seed":[0.1,0.0,2.0],"angle_deg":33.3,"radius":0.5,"stop_at_other":true,"steal":true})",
        R"({"mode":"flood","seed":[0.1,0.0,2.0]})", R"({"mode":"invert","steal":true})", R"({"mode":"clear"})",

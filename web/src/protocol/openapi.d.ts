@@ -614,6 +614,13 @@ export interface components {
             /** @description Model to clip space, row after row: clip = view * (x, y, z, 1); shown where clip w > 0 */
             view: number[];
             outline: components["schemas"]["PolygonOutline"] | components["schemas"]["EllipseOutline"] | components["schemas"]["PolylineOutline"];
+            /**
+             * @description Only samples that the view does not hide behind others: each is a disc as large as its spacing, and hides
+             *     what lies two radii and more behind it. Both sides of a surface are seen. Samples outside the view's depth
+             *     range (clip |z| > w) are neither seen nor hide others; in a parallel view depth grows with clip z
+             * @default false
+             */
+            visible: boolean;
         };
         ScreenPoint: number[];
         /** @description A lasso, closed by itself; inside is where it turns around a point an odd number of times */
@@ -635,6 +642,12 @@ export interface components {
             vertices: components["schemas"]["ScreenPoint"][];
             width: number;
         };
+        /**
+         * @description What depends on the sampling (flood, grow, shrink, `facing`, `visible`) acts on the samples at once and is
+         *     recorded as its outcome in model space: as point sets around the samples that it covered, or as the shape alone
+         *     where `facing` and `visible` kept nothing out. A painting holds no such operation, so that it gives the same
+         *     selection again, and on another sampling the same part of the surface
+         */
         PaintOperation: components["schemas"]["ShapeOperation"] | components["schemas"]["MembershipOperation"] | components["schemas"]["DistanceOperation"] | components["schemas"]["FloodOperation"];
         ShapeOperation: {
             /**
@@ -1377,7 +1390,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description The operations that made it */
+            /** @description The operations that make it, as they are recorded */
             200: {
                 headers: {
                     "X-Request-Id": components["headers"]["RequestId"];
