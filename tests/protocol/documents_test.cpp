@@ -113,9 +113,10 @@ TEST_CASE("the examples of requests pass their parsers and come back the same") 
   const auto document = [](const std::string& name) {
     return parse_json(read_file("examples/" + name + ".json")).value();
   };
-  for (const char* name : {"operation-sphere", "operation-stroke", "operation-box", "operation-half-space",
-                           "operation-all", "operation-points", "operation-invert", "operation-grow",
-                           "operation-screen", "operation-visible", "operation-flood"}) {
+  for (const char* name :
+       {"operation-sphere", "operation-stroke", "operation-box", "operation-half-space", "operation-all",
+        "operation-points", "operation-invert", "operation-grow", "operation-screen", "operation-visible",
+        "operation-flood", "operation-image", "operation-texture", "operation-model"}) {
     CAPTURE(name);
     const Json example = document(name);
     const auto operation = parse_paint_operation(example);
