@@ -3,10 +3,11 @@ import type { SessionDocument } from "./api/types";
 import { CommandQueue } from "./command-queue";
 import { editorShortcuts } from "./editor-shortcuts";
 import { HistoryEditor } from "./edits/history";
+import { PaintSettingsStore } from "./edits/paint-settings";
 import { RegionEditor } from "./edits/regions";
 import { inScene } from "./edits/residual";
 import { TransformEditor } from "./edits/transform";
-import { TRANSFORM_KINDS } from "./event-map";
+import { PAINT_TARGETS, TRANSFORM_KINDS } from "./event-map";
 import { FrameSource } from "./frame-source";
 import { displayFromLink, type LinkState, viewHash } from "./link";
 import { hasAttribute } from "./protocol/frames";
@@ -14,7 +15,10 @@ import { Gizmo } from "./scene/gizmo";
 import { Viewport } from "./scene/viewport";
 import { type Bus, SessionStore } from "./session-store";
 import { type BrushSize, BrushTool } from "./tools/brush-tool";
+import { FloodTool } from "./tools/flood-tool";
 import { OrbitTool } from "./tools/orbit-tool";
+import { type OutlineMethod, OutlineTool } from "./tools/outline-tool";
+import { PaintTool } from "./tools/paint-tool";
 import { steppedRadius } from "./tools/stroke";
 import { ToolManager } from "./tools/tool-manager";
 import { TransformTool } from "./tools/transform-tool";
@@ -22,6 +26,7 @@ import { createColourBar } from "./ui/colour-bar";
 import { createDisplayPanel, loadDisplay, saveDisplay } from "./ui/display-panel";
 import { h } from "./ui/dom";
 import { createHistoryPanel } from "./ui/history-panel";
+import { createPaintBar } from "./ui/paint-bar";
 import { createRegionsPanel } from "./ui/regions-panel";
 import { createShortcutSheet, listen } from "./ui/shortcuts";
 import { createStatusBar } from "./ui/status-bar";
@@ -61,9 +66,9 @@ export function createEditor(
   viewport.setDisplay(display);
 
   const regions = new RegionEditor(bus, client, queue, store);
-  const history = new HistoryEditor(bus, client, queue, store);
-  const transform = new TransformEditor(bus, client, queue, store, (residual) => {
-    viewport.setResidual(residual && inScene(residual, (point) => store.toScene(point)));
+  const history = new HistoryEditor(bus, client, queue, store, regions);
+  const transform = new TransformEditor(bus, client, queue, store, ({ residual, blend }) => {
+    viewport.setResidual(residual && inScene(residual, (point) => store.toScene(point)), blend);
   });
   let loaded = false;
   const source = new FrameSource(bus, client, store, viewport, () => {
@@ -84,20 +89,30 @@ export function createEditor(
   };
 
   const size: BrushSize = { radius: document.diagonal * BRUSH_PART };
-  const brushes = (["zero", "one", "erase"] as const).map(
-    (kind) => new BrushTool(kind, viewport, store, regions, size),
-  );
+  const paint = new PaintSettingsStore(bus);
+  const brush = new BrushTool(viewport, store, regions, size, paint);
+  const outline = (method: OutlineMethod): OutlineTool =>
+    new OutlineTool(method, bus, viewport, store, regions, size, paint);
+  const gestures = {
+    brush,
+    lasso: outline("lasso"),
+    polygon: outline("polygon"),
+    rectangle: outline("rectangle"),
+    ellipse: outline("ellipse"),
+    line: outline("line"),
+    flood: new FloodTool(bus, viewport, store, regions, paint),
+  };
   const setBrush = (radius: number): void => {
     size.radius = steppedRadius(radius, 0, document.diagonal);
     bus.fire("brush.radius", size.radius);
-    for (const brush of brushes) brush.refresh();
+    brush.refresh();
   };
   const stepBrush = (steps: number): void => setBrush(steppedRadius(size.radius, steps, document.diagonal));
   bus.function("brush.set", setBrush);
   bus.function("view.frame", () => viewport.rig.frame());
   const gizmo = new Gizmo(viewport);
   new ToolManager(bus, new OrbitTool(), [
-    ...brushes,
+    ...PAINT_TARGETS.map((target) => new PaintTool(target, bus, viewport, paint, gestures)),
     ...TRANSFORM_KINDS.map((kind) => new TransformTool(kind, bus, viewport, gizmo, store, transform)),
   ]);
   stage.addEventListener(
@@ -112,17 +127,27 @@ export function createEditor(
   );
 
   const transformPanel = createTransformPanel(bus, document, transform);
-  const shortcuts = editorShortcuts({ bus, viewport, editor: transform, transformPanel, stepBrush });
+  // How far regions grow and shrink, until a person says otherwise: what separates neighbouring samples, twice over.
+  const reach = { value: 2 * document.spacing };
+  const shortcuts = editorShortcuts({
+    bus,
+    viewport,
+    editor: transform,
+    transformPanel,
+    stepBrush,
+    command: (region, command) => void regions.command(region, command, reach.value),
+  });
   const sheet = createShortcutSheet(shortcuts);
   bus.function("shortcuts.show", () => sheet.show());
   if (link.ui) listen(shortcuts);
   root.append(
     createTopBar(bus, client, store),
     createToolbar(bus),
+    createPaintBar(bus),
     h(
       "aside",
       { class: "side panel", aria: { label: "Properties" } },
-      createRegionsPanel(bus, store, regions, size.radius),
+      createRegionsPanel(bus, store, regions, size.radius, reach),
       transformPanel.element,
       createDisplayPanel(bus, document, {
         settings: display,
@@ -134,6 +159,7 @@ export function createEditor(
         },
       }),
       createHistoryPanel(bus),
+      transformPanel.foot,
     ),
     createColourBar(bus, display),
     createStatusBar(bus, store),

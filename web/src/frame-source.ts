@@ -131,7 +131,7 @@ export class FrameSource {
     this.last = header;
     const { sequence, revision } = header;
     this.tellLoad(header, true);
-    this.viewport_.mask.frameShown(revision);
+    this.viewport_.frameShown(revision);
     this.bus_.fire("frame.applied", { sequence, revision, key: header.kind === "key" });
   }
 

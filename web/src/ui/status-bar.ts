@@ -27,7 +27,9 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
   bus.on("session.changed", showSession);
   bus.on("preview.changed", ({ state, latencyMs, samplesPerSecond }) => {
     badge.className = `badge ${state}`;
+    badge.title = state === "waiting" ? "The picture shows what it can; the server computes the rest" : "";
     if (state === "preview") setText(badge, "Preview");
+    else if (state === "waiting") setText(badge, "Waiting for the server");
     else if (state === "exact") {
       setText(badge, "Exact");
       setText(timing, `${formatMs(latencyMs)} · ${formatRate(samplesPerSecond)}`);
