@@ -138,10 +138,14 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     {
       group: "Transform",
       keys: "Esc",
-      label: "Cancel, then leave the tool",
+      label: "Cancel, leave the animation, leave the tool",
       matches: key("Escape"),
       run: () => {
         if (bus.invoke("tool.cancel")) return;
+        if (bus.invoke("animation.current") !== null) {
+          bus.invoke("animation.set", null);
+          return;
+        }
         if (editor.pending) bus.invoke("edit.cancel");
         else bus.invoke("tool.activate", "orbit");
       },

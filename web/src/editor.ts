@@ -4,6 +4,8 @@ import { CommandQueue } from "./command-queue";
 import { editorShortcuts } from "./editor-shortcuts";
 import { HistoryEditor } from "./edits/history";
 import { PaintSettingsStore } from "./edits/paint-settings";
+import { Player } from "./edits/player";
+import { applyRecipeFile } from "./edits/recipe";
 import { RegionEditor } from "./edits/regions";
 import { inScene } from "./edits/residual";
 import { TransformEditor } from "./edits/transform";
@@ -26,7 +28,10 @@ import { createColourBar } from "./ui/colour-bar";
 import { createDisplayPanel, loadDisplay, saveDisplay } from "./ui/display-panel";
 import { h } from "./ui/dom";
 import { createHistoryPanel } from "./ui/history-panel";
+import { createImageForm } from "./ui/image-form";
+import { createModelForm } from "./ui/model-form";
 import { createPaintBar } from "./ui/paint-bar";
+import { createPlayback } from "./ui/playback";
 import { createRegionsPanel } from "./ui/regions-panel";
 import { createShortcutSheet, listen } from "./ui/shortcuts";
 import { createStatusBar } from "./ui/status-bar";
@@ -71,10 +76,18 @@ export function createEditor(
     viewport.setResidual(residual && inScene(residual, (point) => store.toScene(point)), blend);
   });
   let loaded = false;
-  const source = new FrameSource(bus, client, store, viewport, () => {
-    if (link.camera) viewport.rig.setState(link.camera);
-    else viewport.rig.home();
-  });
+  const source = new FrameSource(
+    bus,
+    client,
+    store,
+    viewport,
+    () => {
+      if (link.camera) viewport.rig.setState(link.camera);
+      else viewport.rig.home();
+    },
+    () => player.set(null),
+  );
+  const player = new Player(bus, (s) => source.showPart(s));
   bus.on("load.changed", ({ complete }) => {
     loaded = complete;
   });
@@ -147,7 +160,15 @@ export function createEditor(
     h(
       "aside",
       { class: "side panel", aria: { label: "Properties" } },
-      createRegionsPanel(bus, store, regions, size.radius, reach),
+      createRegionsPanel(
+        bus,
+        store,
+        regions,
+        size.radius,
+        reach,
+        createImageForm(bus, client, store, regions, viewport),
+        createModelForm(bus, client, store, regions),
+      ),
       transformPanel.element,
       createDisplayPanel(bus, document, {
         settings: display,
@@ -158,7 +179,10 @@ export function createEditor(
           viewport.rig.home();
         },
       }),
-      createHistoryPanel(bus),
+      createHistoryPanel(
+        bus,
+        createPlayback(bus, client, store, (file) => void applyRecipeFile(bus, client, queue, store, file)),
+      ),
       transformPanel.foot,
     ),
     createColourBar(bus, display),

@@ -68,6 +68,8 @@ export interface Notices {
   "load.changed": LoadStatus;
   "preview.changed": PreviewStatus;
   "transform.changed": TransformState;
+  /** What part of the recorded edits is shown, 0 … 1; null: the committed state. */
+  "animation.changed": { s: number | null; playing: boolean };
   "connection.changed": "live" | "connecting" | "lost";
   "region.touched": { hasRegions: boolean };
   toast: Toast;
@@ -87,6 +89,10 @@ export interface Questions {
   "brush.set": (radius: number) => void;
   "paint.settings": () => PaintSettings;
   "paint.set": (change: Partial<PaintSettings>) => void;
+  /** Shows the recorded edits part of the way; null goes back to the committed state. */
+  "animation.set": (s: number | null) => void;
+  "animation.play": () => void;
+  "animation.current": () => number | null;
   "view.frame": () => void;
   "shortcuts.show": () => void;
 }

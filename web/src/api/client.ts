@@ -166,12 +166,9 @@ export class ApiClient {
   }
 
   /** Applies a recipe, whole, on top of `revision`. */
-  async applyRecipe(id: string, recipe: unknown, revision: number): Promise<void> {
-    await this.request(`v1/sessions/${id}/recipe`, {
-      method: "POST",
-      headers: { "Content-Type": "application/json", "If-Match": `"r${revision}"` },
-      body: JSON.stringify({ recipe, s: 1, timing: "sequence" }),
-    });
+  applyRecipe(id: string, recipe: unknown, revision: number): Promise<SessionDocument> {
+    const body = { recipe, s: 1, timing: "sequence" };
+    return this.send("POST", `v1/sessions/${id}/recipe`, body, { "If-Match": `"r${revision}"` });
   }
 
   uploadImage(image: Blob): Promise<ImageDocument> {

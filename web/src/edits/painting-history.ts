@@ -52,23 +52,32 @@ export class PaintingHistory {
     return { undo: this.done_.at(-1)?.head === head, redo: this.undone_.at(-1)?.head === head };
   }
 
-  /** Runs a change of the painting and keeps what it takes to undo it; `replaces`: lists are not only added to. */
+  /**
+   * Runs a change of the painting and keeps what it takes to undo it. `replaces`: lists are not only added to. The change
+   * hands over the session after each of its requests: where it has moved on by more than those, someone else painted, and
+   * nothing that was painted before can be undone without undoing theirs.
+   */
   async record<Result>(
     painted: readonly RegionName[],
     replaces: boolean,
-    change: () => Promise<Result>,
+    change: (take: (document: SessionDocument) => void) => Promise<Result>,
   ): Promise<Result> {
     const { document } = this.store_;
     const before = countsOf(document);
     const lists = replaces ? await this.read() : undefined;
+    let requests = 0;
     try {
-      return await change();
+      return await change((next) => {
+        ++requests;
+        this.store_.update(next);
+      });
     } finally {
       // Also where a later part of the change was refused: what came before it is painted.
       const now = this.store_.document;
       const after = countsOf(now);
-      if (now.revision !== document.revision) {
-        this.undone_.length = 0;
+      if (now.revision !== document.revision) this.undone_.length = 0;
+      if (now.revision !== document.revision + requests) this.done_.length = 0;
+      else if (requests > 0) {
         if (!same(before, after, "operations") || !same(before, after, "samples"))
           this.done_.push({
             head: now.history.head,

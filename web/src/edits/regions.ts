@@ -6,6 +6,8 @@ import { reportError } from "./errors";
 import type { PaintTarget } from "./paint-settings";
 import { PaintingHistory, REGIONS } from "./painting-history";
 
+export type Painted = SessionDocument & { changed: number };
+
 /** What is done to a region as a whole. */
 export type RegionCommand = "all" | "invert" | "grow" | "shrink" | "clear";
 
@@ -43,34 +45,50 @@ export class RegionEditor {
   }
 
   /** Adds operations to a region's painting; resolves with the session after the last, null where one was refused. */
-  paint(
-    target: PaintTarget,
-    operations: readonly RegionOperation[],
-  ): Promise<(SessionDocument & { changed: number }) | null> {
-    const what = target === "erase" ? "The eraser was refused" : "The painting was refused";
-    return this.change(what, target === "erase" ? REGIONS : [target], false, async (regions) => {
-      let document: (SessionDocument & { changed: number }) | null = null;
-      let changed = 0;
-      for (const region of regions) {
-        // Out of an empty region nothing can be taken.
-        if (target === "erase" && this.store_.document.regions[region].samples === 0) continue;
-        for (const operation of operations) {
-          document = await this.client_.addOperation(this.store_.id, region, operation);
-          changed += document.changed;
-          this.store_.update(document);
-        }
-      }
-      return document && { ...document, changed };
-    });
+  paint(target: PaintTarget, operations: readonly RegionOperation[]): Promise<Painted | null> {
+    if (target !== "erase")
+      return this.paintEach(
+        operations.map((operation): [RegionName, RegionOperation] => [target, operation]),
+      );
+    return this.change("The eraser was refused", REGIONS, false, (take) =>
+      // Out of an empty region nothing can be taken.
+      this.send(
+        REGIONS.filter((region) => this.store_.document.regions[region].samples > 0).flatMap((region) =>
+          operations.map((operation): [RegionName, RegionOperation] => [region, operation]),
+        ),
+        take,
+      ),
+    );
+  }
+
+  /** Several operations as one change, undone together. */
+  paintEach(changes: readonly (readonly [RegionName, RegionOperation])[]): Promise<Painted | null> {
+    const regions = REGIONS.filter((region) => changes.some(([painted]) => painted === region));
+    return this.change("The painting was refused", regions, false, (take) => this.send(changes, take));
+  }
+
+  private async send(
+    changes: readonly (readonly [RegionName, RegionOperation])[],
+    take: (document: SessionDocument) => void,
+  ): Promise<Painted | null> {
+    let last: SessionDocument | null = null;
+    let changed = 0;
+    for (const [region, operation] of changes) {
+      const document = await this.client_.addOperation(this.store_.id, region, operation);
+      changed += document.changed;
+      take(document);
+      last = document;
+    }
+    return last && { ...last, changed };
   }
 
   /** `distance`: how far it grows or shrinks, in model units. */
   command(region: RegionName, command: RegionCommand, distance: number): Promise<SessionDocument | null> {
     const operation = commandOperation(command, distance);
     if (operation) return this.paint(region, [operation]);
-    return this.change("The region was not cleared", [region], true, async () => {
+    return this.change("The region was not cleared", [region], true, async (take) => {
       const document = await this.client_.clearRegion(this.store_.id, region);
-      this.store_.update(document);
+      take(document);
       return document;
     });
   }
@@ -99,10 +117,10 @@ export class RegionEditor {
     what: string,
     regions: readonly RegionName[],
     replaces: boolean,
-    command: (regions: readonly RegionName[]) => Promise<Result>,
+    command: (take: (document: SessionDocument) => void) => Promise<Result>,
   ): Promise<Result | null> {
     try {
-      return await this.queue_.enqueue(() => this.history_.record(regions, replaces, () => command(regions)));
+      return await this.queue_.enqueue(() => this.history_.record(regions, replaces, command));
     } catch (error) {
       reportError(this.bus_, error, what);
       return null;
