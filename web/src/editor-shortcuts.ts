@@ -24,6 +24,7 @@ const TURN = 0.12;
 export function editorShortcuts(context: ShortcutContext): Shortcut[] {
   const { bus, viewport, editor, transformPanel, stepBrush, command } = context;
   const transforming = (): boolean => TRANSFORM_KINDS.some((kind) => kind === bus.invoke("tool.current"));
+  const painting = (): boolean => PAINT_TARGETS.some((target) => target === bus.invoke("tool.current"));
   const tool = (name: ToolName, letter: string, label: string): Shortcut => ({
     group: "Tools",
     keys: letter.toUpperCase(),
@@ -95,8 +96,7 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
         matches: key(letter),
         run: () => {
           bus.invoke("paint.set", { method: name });
-          if (!PAINT_TARGETS.some((target) => target === bus.invoke("tool.current")))
-            bus.invoke("tool.activate", "zero");
+          if (!painting()) bus.invoke("tool.activate", "zero");
         },
       }),
     ),
@@ -104,7 +104,7 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
       group: "Painting",
       keys: "V",
       label: "Outlines choose what is visible, or through all depths",
-      matches: key("v"),
+      matches: (event) => painting() && key("v")(event),
       run: () => bus.invoke("paint.set", { visibleOnly: !bus.invoke("paint.settings").visibleOnly }),
     },
     { group: "Painting", keys: "Shift", label: "Remove from the region" },

@@ -171,6 +171,8 @@ export class OutlineTool implements PaintGesture {
       }
       return;
     }
+    // Alone, this key would open a browser's menu.
+    if (event.key === "Alt") event.preventDefault();
     drawing.mode = modeOf(this.settings_.value, this.target_, event);
     this.draw();
   };
