@@ -162,7 +162,7 @@ test("the whole loop works by the keyboard: shapes and a rotation by numbers", {
   const summary = page.locator("summary", { hasText: "Shape by numbers" });
   await summary.focus();
   await page.keyboard.press("Enter");
-  const form = page.locator("form.shape-form");
+  const form = page.locator('[data-form="numbers"]');
   const paint = async (region, x) => {
     await form.getByLabel("Region").selectOption(region);
     await fill(form, { "Centre X": x, "Centre Y": 0, "Centre Z": 0, Radius: 0.6 });
@@ -210,7 +210,7 @@ test("a twist by numbers: preview, blend and detail, recorded edit", { timeout }
   assert.ok(during.redY < before.redY - 0.1, "the cap has turned up over the axis");
   assert.equal((await edits()).edits.length, 0, "a preview is not recorded");
   await page.locator("summary", { hasText: "Detail" }).click();
-  await page.locator("details.sub input[type=range]").last().fill("0.5");
+  await page.locator('[data-part="detail"] input[type=range]').last().fill("0.5");
   await waitForIdle(page, waitMs);
   const revision = await page.evaluate(() => globalThis.pointwright.status.revision);
   await page.getByRole("button", { name: "Apply", exact: true }).click();

@@ -205,6 +205,7 @@ function shapeForm(store: SessionStore, regions: RegionEditor): HTMLElement {
     "form",
     {
       class: "shape-form",
+      data: { form: "numbers" },
       onsubmit: (event) => {
         event.preventDefault();
         const operation: ShapeOperation = { mode, shape: shapeOf[type]() };
