@@ -150,7 +150,10 @@ export function describeDeformation(deformation: Deformation): string {
     case "twist":
       return `Twisted ${formatNumber(deformation.angle_deg)}°`;
     case "sequence":
-      return deformation.steps.map(describeDeformation).join(", then ");
+      return deformation.steps
+        .map(describeDeformation)
+        .map((step, i) => (i === 0 ? step : step.charAt(0).toLowerCase() + step.slice(1)))
+        .join(", then ");
   }
 }
 

@@ -254,7 +254,7 @@ export function createImageForm(
   const holder = h(
     "details",
     { class: "sub", ontoggle: place },
-    h("summary", {}, "Regions from an image", icon("chevron")),
+    h("summary", {}, h("span", { class: "sub-title" }, "Regions from an image"), icon("chevron")),
     form,
   );
   return holder;

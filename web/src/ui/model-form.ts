@@ -91,7 +91,7 @@ export function createModelForm(
         if (holder.open) void load();
       },
     },
-    h("summary", {}, "Regions from another model", icon("chevron")),
+    h("summary", {}, h("span", { class: "sub-title" }, "Regions from another model"), icon("chevron")),
     form,
   );
   return holder;

@@ -72,7 +72,7 @@ export function createPlayback(
   return h(
     "details",
     { class: "sub" },
-    h("summary", {}, "Playback and recipe", icon("chevron")),
+    h("summary", {}, h("span", { class: "sub-title" }, "Playback and recipe"), icon("chevron")),
     h(
       "div",
       { class: "shape-form" },

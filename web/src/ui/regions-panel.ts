@@ -218,5 +218,10 @@ function shapeForm(store: SessionStore, regions: RegionEditor): HTMLElement {
     fields,
     apply,
   );
-  return h("details", { class: "sub" }, h("summary", {}, "Shape by numbers", icon("chevron")), form);
+  return h(
+    "details",
+    { class: "sub" },
+    h("summary", {}, h("span", { class: "sub-title" }, "Shape by numbers"), icon("chevron")),
+    form,
+  );
 }
