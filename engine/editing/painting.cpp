@@ -75,7 +75,8 @@ class ShapeCover {
     return surface_.origin + surface_.position[i].cast<double>();
   }
   [[nodiscard]] const TexCoord* texcoord(std::size_t i) const {
-    return surface_.texcoord == nullptr ? nullptr : &(*surface_.texcoord)[i];
+    if (surface_.texcoord == nullptr || surface_.texcoord->empty()) return nullptr;
+    return &(*surface_.texcoord)[i];
   }
 
   const PaintSurface& surface_;

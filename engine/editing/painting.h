@@ -74,7 +74,7 @@ struct PaintSurface {
   const Points& normal;    ///< read only for `facing` and for angles
   const Vec3d& origin;
   const NeighborGraph* graph = nullptr;  ///< of its samples; read only for kFlood and what is `visible`
-  const std::vector<TexCoord>* texcoord = nullptr;  ///< one a sample; read only for images mapped by them
+  const std::vector<TexCoord>* texcoord = nullptr;  ///< one a sample, or null or empty: none
 };
 
 /// The samples that an operation covers: those in its shape that pass its filters, those that growing takes

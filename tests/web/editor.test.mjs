@@ -7,85 +7,24 @@ import {
   canvasPlace,
   checkTroubles,
   countPixels,
-  createSession,
   drag,
+  fill,
+  frontCamera,
   json,
   open,
+  openEditor,
+  paintCaps,
+  project,
   service,
   sessionUrl,
   startAroundTests,
   timeout,
+  until,
   waitForRevision,
   waitMs,
 } from "./support.mjs";
 
-const frontCamera = { position: [0, 0, 6], target: [0, 0, 0], up: [0, 1, 0] };
 startAroundTests();
-
-/** Types numbers into the fields of these labels, in this order. */
-async function fill(form, numbers) {
-  for (const [label, value] of Object.entries(numbers)) await form.getByLabel(label).fill(String(value));
-}
-
-/** A page with a session of its own, seen from the front, at rest. */
-async function openEditor(samples = 12_000) {
-  const session = await createSession(service, samples);
-  const { page, troubles } = await open(sessionUrl(service, session));
-  await waitForIdle(page, waitMs);
-  await page.evaluate((camera) => {
-    globalThis.pointwright.camera = camera;
-  }, frontCamera);
-  await waitForIdle(page, waitMs);
-  const state = () => json(`${service.url}/v1/sessions/${session.id}`);
-  const edits = () => json(`${service.url}/v1/sessions/${session.id}/edits`);
-  const close = async () => {
-    await checkTroubles(page, troubles);
-    await page.close();
-  };
-  return { page, session, state, edits, close };
-}
-
-/** A place of the front plane z = 0, in fractions of the canvas, as the front camera sees it. */
-async function project(page, x, y) {
-  const { width, height } = await page.locator("canvas.viewport-canvas").boundingBox();
-  const perUnit = height / 2 / (6 * Math.tan((16 * Math.PI) / 180));
-  return [0.5 + (x * perUnit) / width, 0.5 - (y * perUnit) / height];
-}
-
-/** Waits until the condition holds. */
-async function until(holds, what) {
-  const ends = Date.now() + waitMs;
-  while (!(await holds())) {
-    assert.ok(Date.now() < ends, what);
-    await new Promise((done) => setTimeout(done, 200));
-  }
-}
-
-/** Paints the left cap zero and the right cap one, through the API. */
-async function paintCaps(session, page) {
-  const url = (region) => `${service.url}/v1/sessions/${session.id}/regions/${region}/operations`;
-  const paint = (region, sign) => {
-    const [min, max] =
-      sign < 0
-        ? [
-            [-3, -3, -3],
-            [-0.7, 3, 3],
-          ]
-        : [
-            [0.7, -3, -3],
-            [3, 3, 3],
-          ];
-    const operation = { mode: "add", shape: { type: "box", min, max } };
-    return json(url(region), {
-      method: "POST",
-      headers: { "Content-Type": "application/json" },
-      body: JSON.stringify(operation),
-    });
-  };
-  await paint("zero", -1);
-  const { revision } = await paint("one", 1);
-  await waitForRevision(page, revision);
-}
 
 test("a link opens a session whose surface is whole and without holes", { timeout }, async () => {
   const { page, session, close } = await openEditor(40_000);
@@ -223,7 +162,7 @@ test("the whole loop works by the keyboard: shapes and a rotation by numbers", {
   const summary = page.locator("summary", { hasText: "Shape by numbers" });
   await summary.focus();
   await page.keyboard.press("Enter");
-  const form = page.locator("form.shape-form");
+  const form = page.locator('[data-form="numbers"]');
   const paint = async (region, x) => {
     await form.getByLabel("Region").selectOption(region);
     await fill(form, { "Centre X": x, "Centre Y": 0, "Centre Z": 0, Radius: 0.6 });
@@ -238,7 +177,7 @@ test("the whole loop works by the keyboard: shapes and a rotation by numbers", {
   await page.locator('[data-tool="rotate"]').press("Enter");
   await fill(page, { "Axis X": 0, "Axis Y": 0, "Axis Z": 1 });
   await fill(page, { "Pivot X": 0, "Pivot Y": 0, "Pivot Z": 0, Angle: 30 });
-  await page.getByLabel("Angle").press("Enter");
+  await page.getByLabel("Angle", { exact: true }).press("Enter");
   await waitForRevision(page, revision + 1);
   const { edits: records } = await edits();
   assert.equal(records.length, 1);
@@ -271,7 +210,7 @@ test("a twist by numbers: preview, blend and detail, recorded edit", { timeout }
   assert.ok(during.redY < before.redY - 0.1, "the cap has turned up over the axis");
   assert.equal((await edits()).edits.length, 0, "a preview is not recorded");
   await page.locator("summary", { hasText: "Detail" }).click();
-  await page.locator("details.sub input[type=range]").last().fill("0.5");
+  await page.locator('[data-part="detail"] input[type=range]').last().fill("0.5");
   await waitForIdle(page, waitMs);
   const revision = await page.evaluate(() => globalThis.pointwright.status.revision);
   await page.getByRole("button", { name: "Apply", exact: true }).click();

@@ -97,8 +97,15 @@ test("an automatic audit finds nothing serious on the pages", { timeout }, async
   const editor = await open(sessionUrl(service, session));
   await waitForIdle(editor.page, waitMs);
   assert.deepEqual(await seriousFindings(editor.page), []);
+  await editor.page.keyboard.press("o");
+  await editor.page.keyboard.press("w");
+  for (const name of ["Shape by numbers", "Regions from an image", "Regions from another model"])
+    await editor.page.locator("summary", { hasText: name }).click();
+  await editor.page.locator('[data-region="one"] [aria-controls]').click();
+  assert.deepEqual(await seriousFindings(editor.page), []);
+  await editor.page.locator("canvas.viewport-canvas").focus();
   await editor.page.keyboard.press("g");
-  await editor.page.locator("summary", { hasText: "Shape by numbers" }).click();
+  await editor.page.locator("summary", { hasText: "Playback and recipe" }).click();
   assert.deepEqual(await seriousFindings(editor.page), []);
   await editor.page.locator("canvas.viewport-canvas").focus();
   await editor.page.keyboard.press("?");

@@ -188,3 +188,72 @@ export function startAroundTests() {
     await service?.stop();
   });
 }
+
+/** Looks at the capsule from the front. */
+export const frontCamera = { position: [0, 0, 6], target: [0, 0, 0], up: [0, 1, 0] };
+
+/** Types numbers into the fields of these labels, in this order. */
+export async function fill(form, numbers) {
+  for (const [label, value] of Object.entries(numbers))
+    await form.getByLabel(label, { exact: true }).fill(String(value));
+}
+
+/** A page with a session of its own, seen from the front, at rest. */
+export async function openEditor(samples = 12_000, size = undefined) {
+  const session = await createSession(service, samples);
+  const { page, troubles } = await open(sessionUrl(service, session), size);
+  await waitForIdle(page, waitMs);
+  await page.evaluate((camera) => {
+    globalThis.pointwright.camera = camera;
+  }, frontCamera);
+  await waitForIdle(page, waitMs);
+  const state = () => json(`${service.url}/v1/sessions/${session.id}`);
+  const edits = () => json(`${service.url}/v1/sessions/${session.id}/edits`);
+  const close = async () => {
+    await checkTroubles(page, troubles);
+    await page.close();
+  };
+  return { page, session, state, edits, close };
+}
+
+/** A place of the front plane z = 0, in fractions of the canvas, as the front camera sees it. */
+export async function project(page, x, y) {
+  const { width, height } = await page.locator("canvas.viewport-canvas").boundingBox();
+  const perUnit = height / 2 / (6 * Math.tan((16 * Math.PI) / 180));
+  return [0.5 + (x * perUnit) / width, 0.5 - (y * perUnit) / height];
+}
+
+/** Waits until the condition holds. */
+export async function until(holds, what) {
+  const ends = Date.now() + waitMs;
+  while (!(await holds())) {
+    if (Date.now() > ends) throw new Error(what);
+    await new Promise((done) => setTimeout(done, 200));
+  }
+}
+
+/** Paints the left cap zero and the right cap one, through the API. */
+export async function paintCaps(session, page) {
+  const url = (region) => `${service.url}/v1/sessions/${session.id}/regions/${region}/operations`;
+  const paint = (region, sign) => {
+    const [min, max] =
+      sign < 0
+        ? [
+            [-3, -3, -3],
+            [-0.7, 3, 3],
+          ]
+        : [
+            [0.7, -3, -3],
+            [3, 3, 3],
+          ];
+    const operation = { mode: "add", shape: { type: "box", min, max } };
+    return json(url(region), {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify(operation),
+    });
+  };
+  await paint("zero", -1);
+  const { revision } = await paint("one", 1);
+  await waitForRevision(page, revision);
+}

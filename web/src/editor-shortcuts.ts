@@ -1,8 +1,11 @@
+import type { RegionName } from "./api/types";
+import type { RegionCommand } from "./edits/regions";
 import type { TransformEditor } from "./edits/transform";
-import { type ToolName, TRANSFORM_KINDS } from "./event-map";
+import { PAINT_TARGETS, type ToolName, TRANSFORM_KINDS } from "./event-map";
 import { VIEW_NAMES } from "./scene/camera-math";
 import type { Viewport } from "./scene/viewport";
 import type { Bus } from "./session-store";
+import { METHODS } from "./ui/paint-bar";
 import { ctrl, key, type Shortcut } from "./ui/shortcuts";
 import type { TransformPanel } from "./ui/transform-panel";
 
@@ -12,14 +15,16 @@ export interface ShortcutContext {
   editor: TransformEditor;
   transformPanel: TransformPanel;
   stepBrush: (steps: number) => void;
+  command: (region: RegionName, command: RegionCommand) => void;
 }
 
 const TURN = 0.12;
 
 /** Every key of the editor, as one table: what the sheet shows is what the keys do. */
 export function editorShortcuts(context: ShortcutContext): Shortcut[] {
-  const { bus, viewport, editor, transformPanel, stepBrush } = context;
+  const { bus, viewport, editor, transformPanel, stepBrush, command } = context;
   const transforming = (): boolean => TRANSFORM_KINDS.some((kind) => kind === bus.invoke("tool.current"));
+  const painting = (): boolean => PAINT_TARGETS.some((target) => target === bus.invoke("tool.current"));
   const tool = (name: ToolName, letter: string, label: string): Shortcut => ({
     group: "Tools",
     keys: letter.toUpperCase(),
@@ -33,6 +38,26 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     label: `Only along or about ${name.toUpperCase()}`,
     matches: (event) => transforming() && key(name)(event),
     run: () => editor.setAxis(editor.state.axis === name ? null : name),
+  });
+  /** The region that is being painted; null while none is. */
+  const region = (): RegionName | null => {
+    const current = bus.invoke("tool.current");
+    return current === "zero" || current === "one" ? current : null;
+  };
+  const toRegion = (
+    keys: string,
+    label: string,
+    matches: (event: KeyboardEvent) => boolean,
+    what: RegionCommand,
+  ): Shortcut => ({
+    group: "Painted region",
+    keys,
+    label,
+    matches: (event) => region() !== null && matches(event),
+    run: () => {
+      const painted = region();
+      if (painted) command(painted, what);
+    },
   });
   const nudge = (
     keys: string,
@@ -62,11 +87,38 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     tool("scale", "s", "Scale the one-region"),
     tool("twist", "t", "Twist the one-region"),
     tool("normal", "n", "Raise or carve along the normals"),
+    tool("toward", "a", "Draw the one-region toward a point"),
+    ...METHODS.map(
+      ({ name, label, key: letter }): Shortcut => ({
+        group: "Painting",
+        keys: letter,
+        label,
+        matches: key(letter),
+        run: () => {
+          bus.invoke("paint.set", { method: name });
+          if (!painting()) bus.invoke("tool.activate", "zero");
+        },
+      }),
+    ),
+    {
+      group: "Painting",
+      keys: "V",
+      label: "Outlines choose what is visible, or through all depths",
+      matches: (event) => painting() && key("v")(event),
+      run: () => bus.invoke("paint.set", { visibleOnly: !bus.invoke("paint.settings").visibleOnly }),
+    },
+    { group: "Painting", keys: "Shift", label: "Remove from the region" },
+    { group: "Painting", keys: "Alt", label: "Keep only what the outline holds" },
+    { group: "Painting", keys: "Backspace", label: "Take back a polygon's last corner" },
+    { group: "Painting", keys: "Right Drag", label: "Orbit while painting" },
+    toRegion("Ctrl A", "Everything", ctrl("a"), "all"),
+    toRegion("Ctrl I", "Invert", ctrl("i"), "invert"),
+    toRegion(".", "Grow", key("."), "grow"),
+    toRegion(",", "Shrink", key(","), "shrink"),
+    toRegion("Delete", "Clear", key("Delete"), "clear"),
     { group: "Brush", keys: "[", label: "Smaller brush", matches: key("["), run: () => stepBrush(-1) },
     { group: "Brush", keys: "]", label: "Larger brush", matches: key("]"), run: () => stepBrush(1) },
     { group: "Brush", keys: "Alt Wheel", label: "Brush size" },
-    { group: "Brush", keys: "Shift Drag", label: "Erase" },
-    { group: "Brush", keys: "Right Drag", label: "Orbit while painting" },
     {
       group: "Transform",
       keys: "0…9",
@@ -86,9 +138,14 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     {
       group: "Transform",
       keys: "Esc",
-      label: "Cancel, then leave the tool",
+      label: "Cancel, leave the animation, leave the tool",
       matches: key("Escape"),
       run: () => {
+        if (bus.invoke("tool.cancel")) return;
+        if (bus.invoke("animation.current") !== null) {
+          bus.invoke("animation.set", null);
+          return;
+        }
         if (editor.pending) bus.invoke("edit.cancel");
         else bus.invoke("tool.activate", "orbit");
       },

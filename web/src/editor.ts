@@ -3,10 +3,13 @@ import type { SessionDocument } from "./api/types";
 import { CommandQueue } from "./command-queue";
 import { editorShortcuts } from "./editor-shortcuts";
 import { HistoryEditor } from "./edits/history";
+import { PaintSettingsStore } from "./edits/paint-settings";
+import { Player } from "./edits/player";
+import { applyRecipeFile } from "./edits/recipe";
 import { RegionEditor } from "./edits/regions";
 import { inScene } from "./edits/residual";
 import { TransformEditor } from "./edits/transform";
-import { TRANSFORM_KINDS } from "./event-map";
+import { PAINT_TARGETS, TRANSFORM_KINDS } from "./event-map";
 import { FrameSource } from "./frame-source";
 import { displayFromLink, type LinkState, viewHash } from "./link";
 import { hasAttribute } from "./protocol/frames";
@@ -14,7 +17,10 @@ import { Gizmo } from "./scene/gizmo";
 import { Viewport } from "./scene/viewport";
 import { type Bus, SessionStore } from "./session-store";
 import { type BrushSize, BrushTool } from "./tools/brush-tool";
+import { FloodTool } from "./tools/flood-tool";
 import { OrbitTool } from "./tools/orbit-tool";
+import { type OutlineMethod, OutlineTool } from "./tools/outline-tool";
+import { PaintTool } from "./tools/paint-tool";
 import { steppedRadius } from "./tools/stroke";
 import { ToolManager } from "./tools/tool-manager";
 import { TransformTool } from "./tools/transform-tool";
@@ -22,6 +28,10 @@ import { createColourBar } from "./ui/colour-bar";
 import { createDisplayPanel, loadDisplay, saveDisplay } from "./ui/display-panel";
 import { h } from "./ui/dom";
 import { createHistoryPanel } from "./ui/history-panel";
+import { createImageForm } from "./ui/image-form";
+import { createModelForm } from "./ui/model-form";
+import { createPaintBar } from "./ui/paint-bar";
+import { createPlayback } from "./ui/playback";
 import { createRegionsPanel } from "./ui/regions-panel";
 import { createShortcutSheet, listen } from "./ui/shortcuts";
 import { createStatusBar } from "./ui/status-bar";
@@ -61,15 +71,23 @@ export function createEditor(
   viewport.setDisplay(display);
 
   const regions = new RegionEditor(bus, client, queue, store);
-  const history = new HistoryEditor(bus, client, queue, store);
-  const transform = new TransformEditor(bus, client, queue, store, (residual) => {
-    viewport.setResidual(residual && inScene(residual, (point) => store.toScene(point)));
+  const history = new HistoryEditor(bus, client, queue, store, regions);
+  const transform = new TransformEditor(bus, client, queue, store, ({ residual, blend }) => {
+    viewport.setResidual(residual && inScene(residual, (point) => store.toScene(point)), blend);
   });
   let loaded = false;
-  const source = new FrameSource(bus, client, store, viewport, () => {
-    if (link.camera) viewport.rig.setState(link.camera);
-    else viewport.rig.home();
-  });
+  const source = new FrameSource(
+    bus,
+    client,
+    store,
+    viewport,
+    () => {
+      if (link.camera) viewport.rig.setState(link.camera);
+      else viewport.rig.home();
+    },
+    () => player.set(null),
+  );
+  const player = new Player(bus, (s) => source.showPart(s));
   bus.on("load.changed", ({ complete }) => {
     loaded = complete;
   });
@@ -84,20 +102,30 @@ export function createEditor(
   };
 
   const size: BrushSize = { radius: document.diagonal * BRUSH_PART };
-  const brushes = (["zero", "one", "erase"] as const).map(
-    (kind) => new BrushTool(kind, viewport, store, regions, size),
-  );
+  const paint = new PaintSettingsStore(bus);
+  const brush = new BrushTool(viewport, store, regions, size, paint);
+  const outline = (method: OutlineMethod): OutlineTool =>
+    new OutlineTool(method, bus, viewport, store, regions, size, paint);
+  const gestures = {
+    brush,
+    lasso: outline("lasso"),
+    polygon: outline("polygon"),
+    rectangle: outline("rectangle"),
+    ellipse: outline("ellipse"),
+    line: outline("line"),
+    flood: new FloodTool(bus, viewport, store, regions, paint),
+  };
   const setBrush = (radius: number): void => {
     size.radius = steppedRadius(radius, 0, document.diagonal);
     bus.fire("brush.radius", size.radius);
-    for (const brush of brushes) brush.refresh();
+    brush.refresh();
   };
   const stepBrush = (steps: number): void => setBrush(steppedRadius(size.radius, steps, document.diagonal));
   bus.function("brush.set", setBrush);
   bus.function("view.frame", () => viewport.rig.frame());
   const gizmo = new Gizmo(viewport);
   new ToolManager(bus, new OrbitTool(), [
-    ...brushes,
+    ...PAINT_TARGETS.map((target) => new PaintTool(target, bus, viewport, paint, gestures)),
     ...TRANSFORM_KINDS.map((kind) => new TransformTool(kind, bus, viewport, gizmo, store, transform)),
   ]);
   stage.addEventListener(
@@ -112,17 +140,35 @@ export function createEditor(
   );
 
   const transformPanel = createTransformPanel(bus, document, transform);
-  const shortcuts = editorShortcuts({ bus, viewport, editor: transform, transformPanel, stepBrush });
+  // How far regions grow and shrink, until a person says otherwise: what separates neighbouring samples, twice over.
+  const reach = { value: 2 * document.spacing };
+  const shortcuts = editorShortcuts({
+    bus,
+    viewport,
+    editor: transform,
+    transformPanel,
+    stepBrush,
+    command: (region, command) => void regions.command(region, command, reach.value),
+  });
   const sheet = createShortcutSheet(shortcuts);
   bus.function("shortcuts.show", () => sheet.show());
   if (link.ui) listen(shortcuts);
   root.append(
     createTopBar(bus, client, store),
     createToolbar(bus),
+    createPaintBar(bus),
     h(
       "aside",
       { class: "side panel", aria: { label: "Properties" } },
-      createRegionsPanel(bus, store, regions, size.radius),
+      createRegionsPanel(
+        bus,
+        store,
+        regions,
+        size.radius,
+        reach,
+        createImageForm(bus, client, store, regions, viewport),
+        createModelForm(bus, client, store, regions),
+      ),
       transformPanel.element,
       createDisplayPanel(bus, document, {
         settings: display,
@@ -133,7 +179,11 @@ export function createEditor(
           viewport.rig.home();
         },
       }),
-      createHistoryPanel(bus),
+      createHistoryPanel(
+        bus,
+        createPlayback(bus, client, store, (file) => void applyRecipeFile(bus, client, queue, store, file)),
+      ),
+      transformPanel.foot,
     ),
     createColourBar(bus, display),
     createStatusBar(bus, store),

@@ -1,15 +1,21 @@
-import type { Blend, Deformation, History, Problem, SessionDocument } from "./api/types";
+import type { Blend, ElementaryDeformation, History, Problem, SessionDocument } from "./api/types";
+import type { PaintSettings } from "./edits/paint-settings";
 import type { Vec3 } from "./math/vec3";
 import type { DisplaySettings } from "./scene/display";
 
 /** The tools that deform, in the order of the panel. */
-export const TRANSFORM_KINDS = ["move", "rotate", "scale", "twist", "normal"] as const;
+export const TRANSFORM_KINDS = ["move", "rotate", "scale", "twist", "normal", "toward"] as const;
 export type TransformKind = (typeof TRANSFORM_KINDS)[number];
-export type ToolName = "orbit" | "zero" | "one" | "erase" | TransformKind;
+/** The tools that paint: a region, or both with the eraser. */
+export const PAINT_TARGETS = ["zero", "one", "erase"] as const;
+export type ToolName = "orbit" | (typeof PAINT_TARGETS)[number] | TransformKind;
 
 export interface PreviewStatus {
-  /** `exact`: the picture is the server's frame of the newest parameters. `preview`: the hand is ahead of it. */
-  state: "none" | "preview" | "exact";
+  /**
+   * `exact`: the picture is the server's frame of the newest parameters. `preview`: the hand is ahead of it, and the picture
+   * looks ahead. `waiting`: the picture cannot, and waits for the server.
+   */
+  state: "none" | "preview" | "waiting" | "exact";
   latencyMs: number;
   samplesPerSecond: number;
 }
@@ -21,7 +27,11 @@ export interface LoadStatus {
 }
 
 export interface TransformState {
-  deformation: Deformation | null;
+  /** Of the step that the hand is at. */
+  deformation: ElementaryDeformation | null;
+  /** All steps in order; the current one is null while it does nothing. */
+  steps: readonly (ElementaryDeformation | null)[];
+  step: number;
   pivot: Vec3;
   axis: "x" | "y" | "z" | null;
   pivotEditing: boolean;
@@ -49,12 +59,17 @@ export interface Notices {
   "history.changed": History;
   "tool.changed": ToolName;
   "brush.radius": number;
+  "paint.changed": PaintSettings;
+  /** What of the painting the next undo or redo would change. */
+  "painting.history": { undo: boolean; redo: boolean };
   "display.changed": DisplaySettings;
   "detail.range": number;
   "frame.applied": { sequence: number; revision: number; key: boolean };
   "load.changed": LoadStatus;
   "preview.changed": PreviewStatus;
   "transform.changed": TransformState;
+  /** What part of the recorded edits is shown, 0 … 1; null: the committed state. */
+  "animation.changed": { s: number | null; playing: boolean };
   "connection.changed": "live" | "connecting" | "lost";
   "region.touched": { hasRegions: boolean };
   toast: Toast;
@@ -64,12 +79,20 @@ export interface Notices {
 export interface Questions {
   "tool.activate": (name: ToolName) => void;
   "tool.current": () => ToolName;
+  /** Drops what the tool has begun; false where it has begun nothing. */
+  "tool.cancel": () => boolean;
   "edit.undo": () => Promise<void>;
   "edit.redo": () => Promise<void>;
   "edit.jump": (edit: number) => Promise<void>;
   "edit.commit": () => Promise<void>;
   "edit.cancel": () => void;
   "brush.set": (radius: number) => void;
+  "paint.settings": () => PaintSettings;
+  "paint.set": (change: Partial<PaintSettings>) => void;
+  /** Shows the recorded edits part of the way; null goes back to the committed state. */
+  "animation.set": (s: number | null) => void;
+  "animation.play": () => void;
+  "animation.current": () => number | null;
   "view.frame": () => void;
   "shortcuts.show": () => void;
 }

@@ -24,7 +24,11 @@ export class FrameSource {
   private readonly viewport_: Viewport;
   private readonly stream_: SessionStream;
   private readonly onFirst_: (header: FrameHeader) => void;
+  /** What is shown by part cannot be had. */
+  private readonly onLost_: () => void;
   private level_: number | null = null;
+  /** What part of the recorded edits is shown; null: all of them. */
+  private part_: number | null = null;
   private abort_ = new AbortController();
   private loading_ = false;
   /** Of the stream's frames while a level is shown. */
@@ -37,18 +41,19 @@ export class FrameSource {
     store: SessionStore,
     viewport: Viewport,
     onFirst: (header: FrameHeader) => void,
+    onLost: () => void,
   ) {
     this.bus_ = bus;
     this.client_ = client;
     this.store_ = store;
     this.viewport_ = viewport;
     this.onFirst_ = onFirst;
-    // While a coarser level is shown, the stream's frames say only that there is something new to load.
+    this.onLost_ = onLost;
+    // While something else is shown, the stream's frames say only that there is something new to load.
     const sink: StreamSink = {
-      frameBegin: (header) => this.level_ === null && this.frameBegin(header),
-      frameBlock: (block, header) => this.level_ === null && this.frameBlock(block, header),
-      frameEnd: (header) =>
-        this.level_ === null ? this.frameEnd(header) : this.refreshLevel(header.revision),
+      frameBegin: (header) => this.live && this.frameBegin(header),
+      frameBlock: (block, header) => this.live && this.frameBlock(block, header),
+      frameEnd: (header) => (this.live ? this.frameEnd(header) : this.refreshLevel(header.revision)),
       event: (event) => this.event(event),
     };
     this.stream_ = new SessionStream(client, store.id, sink, {
@@ -70,8 +75,26 @@ export class FrameSource {
   restart(): void {
     this.viewport_.clearSurface();
     if (this.last) this.tellLoad(this.last, false);
-    if (this.level_ === null) this.stream_.start();
-    else void this.loadLevel(this.level_);
+    this.showAgain();
+  }
+
+  /** What streams is what is shown. */
+  private get live(): boolean {
+    return this.level_ === null && this.part_ === null;
+  }
+
+  /** Shows the recorded edits part of the way; one load at a time, and the newest wins. Null: all of them, as they stream. */
+  showPart(s: number | null): void {
+    if (s === this.part_) return;
+    this.part_ = s;
+    if (s !== null && this.loading_) return;
+    if (s === null) this.abort_.abort();
+    this.showAgain();
+  }
+
+  private showAgain(): void {
+    if (this.live) this.stream_.start();
+    else void this.loadStill();
   }
 
   /** Shows a coarser level, or, with null, the whole surface as it streams. */
@@ -80,8 +103,7 @@ export class FrameSource {
     this.level_ = level;
     this.abort_.abort();
     if (this.last) this.tellLoad(this.last, false);
-    if (level === null) this.stream_.start();
-    else void this.loadLevel(level);
+    this.showAgain();
   }
 
   stop(): void {
@@ -131,7 +153,7 @@ export class FrameSource {
     this.last = header;
     const { sequence, revision } = header;
     this.tellLoad(header, true);
-    this.viewport_.mask.frameShown(revision);
+    this.viewport_.frameShown(revision);
     this.bus_.fire("frame.applied", { sequence, revision, key: header.kind === "key" });
   }
 
@@ -153,18 +175,20 @@ export class FrameSource {
   /** Loads the level that is shown again, once the session has moved on; one load at a time. */
   private refreshLevel(revision: number): void {
     this.newest_ = Math.max(this.newest_, revision);
-    if (this.level_ !== null && !this.loading_ && this.newest_ > (this.last?.revision ?? -1))
-      void this.loadLevel(this.level_);
+    if (!this.live && !this.loading_ && this.newest_ > (this.last?.revision ?? -1)) void this.loadStill();
   }
 
-  /** One frame by itself, as a response body. */
-  private async loadLevel(level: number): Promise<void> {
+  /** One frame by itself, as a response body: of the level and of the part that are shown. */
+  private async loadStill(): Promise<void> {
+    const level = this.level_ ?? this.store_.document.levels.length - 1;
+    const part = this.part_;
     const abort = new AbortController();
     const { signal } = abort;
     this.abort_ = abort;
     this.loading_ = true;
+    let failed = false;
     try {
-      const response = await this.client_.frame(this.store_.id, level, signal);
+      const response = await this.client_.frame(this.store_.id, level, signal, part ?? undefined);
       const bytes = new Uint8Array(await response.arrayBuffer());
       if (signal.aborted) return;
       const frame = new FrameReader(bytes.byteLength);
@@ -178,12 +202,17 @@ export class FrameSource {
       for (let block = frame.next(); block; block = frame.next()) this.frameBlock(block, header);
       this.frameEnd(header);
     } catch (error) {
-      if (!signal.aborted) reportError(this.bus_, error, "This level could not be shown");
+      if (!signal.aborted)
+        reportError(this.bus_, error, part === null ? "This level could not be shown" : "No animation");
       this.newest_ = -1;
+      failed = true;
     } finally {
       if (this.abort_ === abort) {
         this.loading_ = false;
-        this.refreshLevel(-1);
+        // The hand has moved on meanwhile.
+        if (failed && part !== null) this.onLost_();
+        else if (this.part_ !== part && this.part_ !== null) void this.loadStill();
+        else this.refreshLevel(-1);
       }
     }
   }

@@ -5,6 +5,8 @@ import type {
   EditRecord,
   ExportFormat,
   History,
+  ImageDocument,
+  RecordedOperation,
   RegionName,
   RegionOperation,
   ServiceInfo,
@@ -96,8 +98,8 @@ export class ApiClient {
     await this.request(`v1/sessions/${id}`, { method: "DELETE" });
   }
 
-  async regionOperations(id: string, region: RegionName): Promise<RegionOperation[]> {
-    return (await this.json<{ operations: RegionOperation[] }>(`v1/sessions/${id}/regions/${region}`))
+  async regionOperations(id: string, region: RegionName): Promise<RecordedOperation[]> {
+    return (await this.json<{ operations: RecordedOperation[] }>(`v1/sessions/${id}/regions/${region}`))
       .operations;
   }
 
@@ -109,7 +111,11 @@ export class ApiClient {
     return this.send("POST", `v1/sessions/${id}/regions/${region}/operations`, operation);
   }
 
-  putOperations(id: string, region: RegionName, operations: RegionOperation[]): Promise<SessionDocument> {
+  putOperations(
+    id: string,
+    region: RegionName,
+    operations: readonly RecordedOperation[],
+  ): Promise<SessionDocument> {
     return this.send("PUT", `v1/sessions/${id}/regions/${region}`, { operations });
   }
 
@@ -146,12 +152,31 @@ export class ApiClient {
     return this.url(`v1/sessions/${id}/samples?format=${format}`);
   }
 
-  /** One key frame of a level, as bytes. */
-  frame(id: string, level: number, signal: AbortSignal): Promise<Response> {
+  /** One key frame of a level, as bytes; with `s`, of the recorded edits done by that part. */
+  frame(id: string, level: number, signal: AbortSignal, s?: number): Promise<Response> {
+    const part = s === undefined ? "" : `&s=${s}`;
     return this.request(
-      `v1/sessions/${id}/samples?format=frame&level=${level}&attributes=${STREAM_ATTRIBUTES}`,
+      `v1/sessions/${id}/samples?format=frame&level=${level}&attributes=${STREAM_ATTRIBUTES}${part}`,
       { signal },
     );
+  }
+
+  recipeUrl(id: string): string {
+    return this.url(`v1/sessions/${id}/recipe`);
+  }
+
+  /** Applies a recipe, whole, on top of `revision`. */
+  applyRecipe(id: string, recipe: unknown, revision: number): Promise<SessionDocument> {
+    const body = { recipe, s: 1, timing: "sequence" };
+    return this.send("POST", `v1/sessions/${id}/recipe`, body, { "If-Match": `"r${revision}"` });
+  }
+
+  uploadImage(image: Blob): Promise<ImageDocument> {
+    return this.json("v1/images", {
+      method: "POST",
+      headers: { "Content-Type": "image/png" },
+      body: image,
+    });
   }
 
   stream(id: string, signal: AbortSignal): Promise<Response> {

@@ -21,15 +21,76 @@ export type SessionDocument = WithVectors<Schemas["Session"]>;
 export type SessionSummary = WithVectors<Schemas["SessionSummary"]>;
 export type PaintedSession = WithVectors<Schemas["PaintedSession"]>;
 
+export type Vec2 = readonly [number, number];
+
+/** A curve over the picture, in the device coordinates of a view. */
+export type Outline =
+  | { type: "polygon"; vertices: Vec2[] }
+  | { type: "ellipse"; center: Vec2; half_axes: Vec2 }
+  | { type: "polyline"; vertices: Vec2[]; width: number };
+
+/** All that a view projects into an outline; with `visible`, only what is in front there. */
+export interface ScreenShape {
+  type: "screen";
+  /** Model to clip space, row after row. */
+  view: number[];
+  outline: Outline;
+  visible?: true;
+}
+
+/** Where the pixels of an image are above or below a threshold. */
+export interface ImageShape {
+  type: "image";
+  image: string;
+  channel: ImageChannel;
+  threshold: number;
+  side: "above" | "below";
+  projection:
+    | { type: "texture"; repeat: boolean }
+    /** The lower left corner, the whole width and the whole height. */
+    | { type: "planar"; origin: Vec3; u: Vec3; v: Vec3; depth?: Vec2 };
+}
+export type ImageChannel = "luminance" | "red" | "green" | "blue" | "alpha";
+
+export interface ImageDocument {
+  id: string;
+  width: number;
+  height: number;
+  channels: number;
+  bytes: number;
+}
+
+/** What is within a distance of another cloud, placed by a matrix (row after row). */
+export interface ModelShape {
+  type: "model";
+  cloud: string;
+  matrix: number[];
+  thickness: number;
+}
+
 /** The shapes that the viewer paints with. */
-export type Shape = WithVectors<Exclude<Schemas["Shape"], { type: "points" | "screen" | "image" | "model" }>>;
+export type Shape =
+  | WithVectors<Exclude<Schemas["Shape"], { type: "points" | "screen" | "image" | "model" }>>
+  | ScreenShape
+  | ImageShape
+  | ModelShape;
 /** What the server need not be told has its default. */
-export type RegionOperation = Omit<WithVectors<Schemas["ShapeOperation"]>, "shape" | "steal"> & {
+export type ShapeOperation = Omit<WithVectors<Schemas["ShapeOperation"]>, "shape" | "steal"> & {
   shape: Shape;
   steal?: boolean;
 };
+type Lenient<Operation> = Operation extends object
+  ? Omit<Operation, "steal" | "stop_at_other"> & { steal?: boolean; stop_at_other?: boolean }
+  : never;
+export type FloodOperation = Lenient<WithVectors<Schemas["FloodOperation"]>>;
+export type MembershipOperation = Lenient<Schemas["MembershipOperation"]>;
+export type DistanceOperation = Lenient<Schemas["DistanceOperation"]>;
+export type RegionOperation = ShapeOperation | FloodOperation | MembershipOperation | DistanceOperation;
+/** A painting's list as the server holds it: not always what was sent, and sent back unread. */
+export type RecordedOperation = { readonly mode: string };
 
 export type Deformation = WithVectors<Schemas["Deformation"]>;
+export type ElementaryDeformation = WithVectors<Schemas["ElementaryDeformation"]>;
 export type Blend = Schemas["Blend"];
 export type EditBody = Omit<WithVectors<Schemas["Edit"]>, "blend" | "gains"> & {
   blend?: Blend;

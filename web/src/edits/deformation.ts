@@ -1,4 +1,5 @@
-import type { Deformation, EditBody } from "../api/types";
+import type { Deformation, EditBody, ElementaryDeformation } from "../api/types";
+import type { TransformKind } from "../event-map";
 import { isFiniteVec3, length, type Vec3 } from "../math/vec3";
 
 /** Limits of the server. */
@@ -9,26 +10,46 @@ const GREATEST_LENGTH = 1e9;
 
 export const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] } as const satisfies Record<string, Vec3>;
 
-export function translation(vector: Vec3): Deformation {
+export function translation(vector: Vec3): ElementaryDeformation {
   return { type: "translation", vector };
 }
 
-export function rotation(point: Vec3, direction: Vec3, angleDeg: number): Deformation {
+export function rotation(point: Vec3, direction: Vec3, angleDeg: number): ElementaryDeformation {
   return { type: "rotation", axis: { point, direction }, angle_deg: angleDeg };
 }
 
-export function scaling(center: Vec3, factors: Vec3): Deformation {
+export function scaling(center: Vec3, factors: Vec3): ElementaryDeformation {
   return { type: "scale", center, factors };
 }
 
 /** `length`: the height along the axis over which the surface turns by the angle. */
-export function twisting(point: Vec3, direction: Vec3, angleDeg: number, length: number): Deformation {
+export function twisting(
+  point: Vec3,
+  direction: Vec3,
+  angleDeg: number,
+  length: number,
+): ElementaryDeformation {
   return { type: "twist", axis: { point, direction }, angle_deg: angleDeg, length };
 }
 
-export function alongNormal(distance: number): Deformation {
+export function alongNormal(distance: number): ElementaryDeformation {
   return { type: "along_normal", distance };
 }
+
+/** `amount`: 1 is all the way, a negative one leads away. */
+export function towardPoint(target: Vec3, amount: number): ElementaryDeformation {
+  return { type: "toward_point", target, amount };
+}
+
+/** The tool that makes deformations of a type. */
+export const KIND_OF_TYPE: Record<ElementaryDeformation["type"], TransformKind> = {
+  translation: "move",
+  rotation: "rotate",
+  scale: "scale",
+  twist: "twist",
+  along_normal: "normal",
+  toward_point: "toward",
+};
 
 /** Whether a deformation moves nothing. */
 export function isIdentity(deformation: Deformation): boolean {
@@ -49,10 +70,26 @@ export function isIdentity(deformation: Deformation): boolean {
 }
 
 /** The same deformation about another pivot; null where it has none. */
-export function withPivot(deformation: Deformation, pivot: Vec3): Deformation | null {
+export function withPivot(deformation: ElementaryDeformation, pivot: Vec3): ElementaryDeformation | null {
+  if (deformation.type === "toward_point") return { ...deformation, target: pivot };
   if (deformation.type === "scale") return { ...deformation, center: pivot };
   if (deformation.type !== "rotation" && deformation.type !== "twist") return null;
   return { ...deformation, axis: { ...deformation.axis, point: pivot } };
+}
+
+/** What a deformation turns about, leaves in place or leads to; null where it has none. */
+export function pivotOf(deformation: ElementaryDeformation): Vec3 | null {
+  switch (deformation.type) {
+    case "scale":
+      return deformation.center;
+    case "rotation":
+    case "twist":
+      return deformation.axis.point;
+    case "toward_point":
+      return deformation.target;
+    default:
+      return null;
+  }
 }
 
 function axisFault(axis: { point: Vec3; direction: Vec3 }, angleDeg: number): string | null {
@@ -113,7 +150,10 @@ export function describeDeformation(deformation: Deformation): string {
     case "twist":
       return `Twisted ${formatNumber(deformation.angle_deg)}°`;
     case "sequence":
-      return deformation.steps.map(describeDeformation).join(", then ");
+      return deformation.steps
+        .map(describeDeformation)
+        .map((step, i) => (i === 0 ? step : step.charAt(0).toLowerCase() + step.slice(1)))
+        .join(", then ");
   }
 }
 

@@ -1,5 +1,5 @@
-import type { Deformation } from "../api/types";
-import { type Residual, residual } from "./residual";
+import type { Blend, Deformation } from "../api/types";
+import { type Conditions, type LookAhead, lookAhead, type Parameters } from "./residual";
 
 export interface PreviewTransport {
   put(deformation: Deformation, sequence: number): Promise<void>;
@@ -7,18 +7,20 @@ export interface PreviewTransport {
 }
 
 export interface PreviewListener {
-  /** What the picture must add to the server's last frame; null where nothing or nothing that composes. */
-  onResidual(residual: Residual | null): void;
+  /** What the picture must add to the server's last frame. */
+  onLookAhead(ahead: LookAhead): void;
   /** The newest parameters' own frame is on the screen; it took so long since they were sent. */
   onExact(latencyMs: number): void;
-  onAhead(): void;
+  /** The hand is ahead of the frame; `covered`: the picture looks ahead that far. */
+  onAhead(covered: boolean): void;
   onError(error: unknown): void;
 }
 
-interface Sent {
-  deformation: Deformation;
+interface Sent extends Parameters {
   at: number;
 }
+
+const PLAIN: Conditions = { blend: "quartic", gains: "" };
 
 /**
  * Sends a drag's parameters: one request in flight, the newest wins, sequence numbers rise. Knows which of them the frame
@@ -31,8 +33,11 @@ export class PreviewSender {
   private readonly sent_ = new Map<number, Sent>();
   private sequence_: number;
   private newest_ = 0;
-  private wanted_: Deformation | null = null;
-  private shown_: Deformation | null = null;
+  private wanted_: Parameters | null = null;
+  private shown_: Parameters | null = null;
+  /** Of the frame's t: committed frames are quartic, or, for a while, what the last preview was. */
+  private frameBlend_: Blend | null = "quartic";
+  private otherBlends_ = false;
   private waiting_ = false;
   private flight_: Promise<void> | null = null;
   private active_ = false;
@@ -56,27 +61,28 @@ export class PreviewSender {
   }
 
   get wanted(): Deformation | null {
-    return this.wanted_;
+    return this.wanted_?.deformation ?? null;
   }
 
   /** New parameters of the hand. */
-  want(deformation: Deformation): void {
-    this.wanted_ = deformation;
+  want(deformation: Deformation, under: Conditions = PLAIN): void {
+    this.wanted_ = { deformation, under };
+    this.otherBlends_ ||= under.blend !== "quartic";
     this.active_ = true;
     this.waiting_ = true;
-    this.listener_.onAhead();
-    this.tellResidual();
+    this.listener_.onAhead(this.tellAhead().covered);
     this.pump();
   }
 
   /** A frame of the stream has come whole: `sequence` as its header says, 0 for the committed state. */
   frameShown(sequence: number): void {
     const sent = sequence === 0 ? undefined : this.sent_.get(sequence);
-    this.shown_ = sent?.deformation ?? null;
+    this.shown_ = sent ?? null;
+    this.frameBlend_ = sent?.under.blend ?? (this.otherBlends_ ? null : "quartic");
     for (const old of this.sent_.keys()) {
       if (sequence !== 0 && old < sequence) this.sent_.delete(old);
     }
-    this.tellResidual();
+    this.tellAhead();
     if (sent && sequence === this.newest_ && !this.waiting_) this.listener_.onExact(this.now_() - sent.at);
   }
 
@@ -94,7 +100,7 @@ export class PreviewSender {
     this.wanted_ = null;
     this.waiting_ = false;
     this.active_ = false;
-    this.tellResidual();
+    this.tellAhead();
     if (!active) return;
     await this.idle();
     await this.transport_.end();
@@ -111,9 +117,9 @@ export class PreviewSender {
     this.sequence_ += 1;
     const sequence = this.sequence_;
     this.newest_ = sequence;
-    this.sent_.set(sequence, { deformation: this.wanted_, at: this.now_() });
+    this.sent_.set(sequence, { ...this.wanted_, at: this.now_() });
     this.flight_ = this.transport_
-      .put(this.wanted_, sequence)
+      .put(this.wanted_.deformation, sequence)
       .catch((error: unknown) => {
         this.waiting_ = false;
         this.listener_.onError(error);
@@ -124,7 +130,9 @@ export class PreviewSender {
       });
   }
 
-  private tellResidual(): void {
-    this.listener_.onResidual(this.shown_ || this.wanted_ ? residual(this.shown_, this.wanted_) : null);
+  private tellAhead(): LookAhead {
+    const ahead = lookAhead(this.shown_, this.wanted_, this.frameBlend_);
+    this.listener_.onLookAhead(ahead);
+    return ahead;
   }
 }

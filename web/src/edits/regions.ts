@@ -3,6 +3,29 @@ import type { RegionName, RegionOperation, SessionDocument } from "../api/types"
 import type { CommandQueue } from "../command-queue";
 import type { Bus, SessionStore } from "../session-store";
 import { reportError } from "./errors";
+import type { PaintTarget } from "./paint-settings";
+import { PaintingHistory, REGIONS } from "./painting-history";
+
+export type Painted = SessionDocument & { changed: number };
+
+/** What is done to a region as a whole. */
+export type RegionCommand = "all" | "invert" | "grow" | "shrink" | "clear";
+
+/** The operation of a command; null where the region's list is dropped. */
+export function commandOperation(command: RegionCommand, distance: number): RegionOperation | null {
+  switch (command) {
+    case "all":
+      return { mode: "add", shape: { type: "all" }, steal: true };
+    case "invert":
+      return { mode: "invert", steal: true };
+    case "grow":
+      return { mode: "grow", distance, steal: true };
+    case "shrink":
+      return { mode: "shrink", distance };
+    case "clear":
+      return null;
+  }
+}
 
 /** Paintings of the two regions. Each change waits for those before it, so strokes land in the order of the hand. */
 export class RegionEditor {
@@ -10,58 +33,99 @@ export class RegionEditor {
   private readonly client_: ApiClient;
   private readonly queue_: CommandQueue;
   private readonly store_: SessionStore;
+  private readonly history_: PaintingHistory;
 
   constructor(bus: Bus, client: ApiClient, queue: CommandQueue, store: SessionStore) {
     this.bus_ = bus;
     this.client_ = client;
     this.queue_ = queue;
     this.store_ = store;
+    this.history_ = new PaintingHistory(client, store);
+    bus.on("session.changed", () => bus.fire("painting.history", this.history_.next));
   }
 
   /** Adds operations to a region's painting; resolves with the session after the last, null where one was refused. */
-  paint(region: RegionName, operations: readonly RegionOperation[]): Promise<SessionDocument | null> {
-    return this.change("The painting was refused", async () => {
-      let document: SessionDocument | null = null;
-      for (const operation of operations) {
-        document = await this.client_.addOperation(this.store_.id, region, operation);
-        this.store_.update(document);
-      }
-      return document;
-    });
+  paint(target: PaintTarget, operations: readonly RegionOperation[]): Promise<Painted | null> {
+    if (target !== "erase")
+      return this.paintEach(
+        operations.map((operation): [RegionName, RegionOperation] => [target, operation]),
+      );
+    return this.change("The eraser was refused", REGIONS, false, (take) =>
+      // Out of an empty region nothing can be taken.
+      this.send(
+        REGIONS.filter((region) => this.store_.document.regions[region].samples > 0).flatMap((region) =>
+          operations.map((operation): [RegionName, RegionOperation] => [region, operation]),
+        ),
+        take,
+      ),
+    );
   }
 
-  /** Takes the shapes out of both regions. */
-  erase(operations: readonly RegionOperation[]): Promise<SessionDocument | null> {
-    return this.change("The eraser was refused", async () => {
-      let document: SessionDocument | null = null;
-      for (const region of ["zero", "one"] as const) {
-        if (this.store_.document.regions[region].samples === 0) continue;
-        for (const operation of operations) {
-          document = await this.client_.addOperation(this.store_.id, region, operation);
-          this.store_.update(document);
-        }
-      }
-      return document;
-    });
+  /** Several operations as one change, undone together. */
+  paintEach(changes: readonly (readonly [RegionName, RegionOperation])[]): Promise<Painted | null> {
+    const regions = REGIONS.filter((region) => changes.some(([painted]) => painted === region));
+    return this.change("The painting was refused", regions, false, (take) => this.send(changes, take));
   }
 
-  clear(region: RegionName): Promise<SessionDocument | null> {
-    return this.change("The region was not cleared", async () => {
+  private async send(
+    changes: readonly (readonly [RegionName, RegionOperation])[],
+    take: (document: SessionDocument) => void,
+  ): Promise<Painted | null> {
+    let last: SessionDocument | null = null;
+    let changed = 0;
+    for (const [region, operation] of changes) {
+      const document = await this.client_.addOperation(this.store_.id, region, operation);
+      changed += document.changed;
+      take(document);
+      last = document;
+    }
+    return last && { ...last, changed };
+  }
+
+  /** `distance`: how far it grows or shrinks, in model units. */
+  command(region: RegionName, command: RegionCommand, distance: number): Promise<SessionDocument | null> {
+    const operation = commandOperation(command, distance);
+    if (operation) return this.paint(region, [operation]);
+    return this.change("The region was not cleared", [region], true, async (take) => {
       const document = await this.client_.clearRegion(this.store_.id, region);
-      this.store_.update(document);
+      take(document);
       return document;
     });
   }
 
-  private async change(
+  /** Undoes (-1) or redoes (1) where that concerns the painting; false where it does not. Within the command queue. */
+  async step(by: -1 | 1): Promise<boolean> {
+    const result = await this.history_.step(by);
+    this.bus_.fire("painting.history", this.history_.next);
+    if (result === "none") return false;
+    if (result === "stale")
+      this.bus_.fire("toast", {
+        kind: "info",
+        title: "The painting has changed meanwhile",
+        lines: ["Someone else painted: what was painted here before can no longer be undone."],
+      });
+    if (result === "nearly")
+      this.bus_.fire("toast", {
+        kind: "info",
+        title: "The painting is nearly as it was",
+        lines: ["Where the regions were painted over each other, the order of the strokes is not kept."],
+      });
+    return true;
+  }
+
+  private async change<Result>(
     what: string,
-    command: () => Promise<SessionDocument | null>,
-  ): Promise<SessionDocument | null> {
+    regions: readonly RegionName[],
+    replaces: boolean,
+    command: (take: (document: SessionDocument) => void) => Promise<Result>,
+  ): Promise<Result | null> {
     try {
-      return await this.queue_.enqueue(command);
+      return await this.queue_.enqueue(() => this.history_.record(regions, replaces, command));
     } catch (error) {
       reportError(this.bus_, error, what);
       return null;
+    } finally {
+      this.bus_.fire("painting.history", this.history_.next);
     }
   }
 }

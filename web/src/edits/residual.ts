@@ -1,4 +1,4 @@
-import type { Deformation } from "../api/types";
+import type { Blend, Deformation, ElementaryDeformation } from "../api/types";
 import { distance, dot, length, normalise, subtract, type Vec3 } from "../math/vec3";
 import { isIdentity } from "./deformation";
 
@@ -15,7 +15,10 @@ export type Residual =
   | { kind: "twist"; point: Vec3; direction: Vec3; degPerUnit: number }
   | { kind: "along_normal"; distance: number };
 
-/** All of a deformation that the viewer makes; null for those that only others make. */
+/** What is left of a length that is drawn to a point all the way: nothing that a normal could be turned by. */
+const LEAST_LEFT = 1e-6;
+
+/** All of a deformation; null for several steps. */
 function whole(wanted: Deformation): Residual | null {
   switch (wanted.type) {
     case "translation":
@@ -38,10 +41,34 @@ function whole(wanted: Deformation): Residual | null {
       };
     case "along_normal":
       return { kind: "along_normal", distance: wanted.distance };
-    case "toward_point":
+    case "toward_point": {
+      // p + t amount (target - p) scales by 1 - t amount about the target.
+      const left = Math.max(1 - wanted.amount, LEAST_LEFT);
+      return { kind: "scale", point: wanted.target, from: [1, 1, 1], to: [left, left, left] };
+    }
     case "sequence":
       return null;
   }
+}
+
+const stepsOf = (deformation: Deformation | null): readonly ElementaryDeformation[] =>
+  deformation?.type === "sequence" ? deformation.steps : deformation ? [deformation] : [];
+
+/** Both without the steps that they share before their last ones: those are on the screen already, whatever follows. */
+function withoutShared(
+  shown: Deformation | null,
+  wanted: Deformation | null,
+): [Deformation | null, Deformation | null] {
+  const [a, b] = [stepsOf(shown), stepsOf(wanted)];
+  let shared = 0;
+  while (shared < Math.min(a.length, b.length) && JSON.stringify(a[shared]) === JSON.stringify(b[shared]))
+    ++shared;
+  const rest = (steps: readonly ElementaryDeformation[]): Deformation | null => {
+    const left = steps.slice(shared);
+    const [only] = left;
+    return left.length > 1 ? { type: "sequence", steps: left } : (only ?? null);
+  };
+  return [rest(a), rest(b)];
 }
 
 function reversed(shown: Residual): Residual {
@@ -76,13 +103,20 @@ function sameLine(a: { point: Vec3; direction: Vec3 }, b: { point: Vec3; directi
  * Null where nothing remains, and where the two do not compose: then the picture waits for the server.
  */
 export function residual(shown: Deformation | null, wanted: Deformation | null): Residual | null {
-  const done = shown && !isIdentity(shown) ? shown : null;
-  const due = wanted && !isIdentity(wanted) ? wanted : null;
+  const moves = (each: Deformation | null): Deformation | null => (each && !isIdentity(each) ? each : null);
+  const several = stepsOf(shown).length > 1 || stepsOf(wanted).length > 1;
+  const [done, due] = several ? withoutShared(moves(shown), moves(wanted)) : [moves(shown), moves(wanted)];
+  // The normal of a later step is not the edited level's.
+  if (several && [...stepsOf(done), ...stepsOf(due)].some((step) => step.type === "along_normal"))
+    return null;
   const from = done && whole(done);
   const to = due && whole(due);
   if (!from || !to) {
     if (done && due) return null;
-    return to ?? (from && reversed(from));
+    // What was drawn into one point cannot be drawn out of it.
+    return (
+      to ?? (from && done?.type === "toward_point" && done.amount > 0.99 ? null : from && reversed(from))
+    );
   }
   if (from.kind === "translation" && to.kind === "translation")
     return { kind: "translation", vector: subtract(to.vector, from.vector) };
@@ -98,6 +132,7 @@ export function residual(shown: Deformation | null, wanted: Deformation | null):
     return sameLine(to, from) !== 0 && onePlace(to.point, from.point)
       ? { ...to, degPerUnit: to.degPerUnit - from.degPerUnit }
       : null;
+  if (done?.type === "toward_point" && done.amount > 0.99) return null;
   if (from.kind === "scale" && to.kind === "scale")
     return onePlace(to.point, from.point) ? { ...to, from: from.to } : null;
   return null;
@@ -106,4 +141,47 @@ export function residual(shown: Deformation | null, wanted: Deformation | null):
 /** The residual in the coordinates of the scene. */
 export function inScene(residual: Residual, toScene: (point: Vec3) => Vec3): Residual {
   return "point" in residual ? { ...residual, point: toScene(residual.point) } : residual;
+}
+
+/** What an edit is made under, beside its deformation. */
+export interface Conditions {
+  blend: Blend;
+  /** The gains in words; empty where the detail stays as it is. */
+  gains: string;
+}
+
+export interface Parameters {
+  deformation: Deformation;
+  under: Conditions;
+}
+
+export interface LookAhead {
+  residual: Residual | null;
+  /** What t of the frame, a quartic one, is turned into; null: it stays. */
+  blend: Blend | null;
+  /** Whether that is all of what is wanted: else the picture waits for the server. */
+  covered: boolean;
+}
+
+/**
+ * How the picture gets from the frame on the screen to what is wanted. `frameBlend`: which blend made the frame's t; null
+ * where that is not known. Gains need the details of every band, which only the server has.
+ */
+export function lookAhead(
+  shown: Parameters | null,
+  wanted: Parameters | null,
+  frameBlend: Blend | null,
+): LookAhead {
+  if (!wanted) return { residual: residual(shown?.deformation ?? null, null), blend: null, covered: true };
+  const still = !shown || isIdentity(shown.deformation);
+  const sameGains = (shown?.under.gains ?? "") === wanted.under.gains;
+  const idle = isIdentity(wanted.deformation);
+  const same = JSON.stringify(shown?.deformation) === JSON.stringify(wanted.deformation);
+  const rest = residual(shown?.deformation ?? null, wanted.deformation);
+  if (frameBlend === wanted.under.blend || (still && idle))
+    return { residual: rest, blend: null, covered: sameGains && (rest !== null || same || (still && idle)) };
+  // From quartic there is a way back to x; a deformation that is done already is done under its own t.
+  if (still && frameBlend === "quartic")
+    return { residual: rest, blend: wanted.under.blend, covered: sameGains && rest !== null };
+  return { residual: still ? rest : null, blend: null, covered: false };
 }

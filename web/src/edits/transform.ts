@@ -1,14 +1,36 @@
 import type { ApiClient } from "../api/client";
 import { problemOf } from "../api/problem";
-import type { Blend, Deformation, EditBody, SessionDocument } from "../api/types";
+import type { Blend, Deformation, EditBody, ElementaryDeformation, SessionDocument } from "../api/types";
 import type { CommandQueue } from "../command-queue";
-import type { TransformState } from "../event-map";
+import { type ToolName, TRANSFORM_KINDS, type TransformKind, type TransformState } from "../event-map";
 import type { Vec3 } from "../math/vec3";
 import type { Bus, SessionStore } from "../session-store";
-import { AXES, deformationFault, describeEdit, isIdentity, translation, withPivot } from "./deformation";
+import {
+  AXES,
+  deformationFault,
+  describeEdit,
+  isIdentity,
+  KIND_OF_TYPE,
+  pivotOf,
+  translation,
+  withPivot,
+} from "./deformation";
 import { reportChangedMeanwhile, reportError } from "./errors";
 import { PreviewSender } from "./preview";
-import type { Residual } from "./residual";
+import type { LookAhead } from "./residual";
+import {
+  allSteps,
+  composed,
+  MAX_STEPS,
+  normalStep,
+  ONE_STEP,
+  type Steps,
+  withNormalFirst,
+  withoutStep,
+  withStepAdded,
+  withStepChosen,
+  withSwapped,
+} from "./steps";
 
 function obstacleOf(session: SessionDocument): string | null {
   if (session.state !== "ready") return "The session is still being prepared.";
@@ -27,7 +49,9 @@ export class TransformEditor {
   private readonly client_: ApiClient;
   private readonly queue_: CommandQueue;
   private readonly store_: SessionStore;
-  private deformation_: Deformation | null = null;
+  /** Of the step that the hand is at. */
+  private deformation_: ElementaryDeformation | null = null;
+  private steps_: Steps = ONE_STEP;
   private pivot_: Vec3 = [0, 0, 0];
   private axis_: TransformState["axis"] = null;
   private pivotEditing_ = false;
@@ -36,13 +60,15 @@ export class TransformEditor {
   private blend_: Blend = "quartic";
   private gains_: number[];
   private committing_: number | null = null;
+  /** The tool asks for a step that there is no room for. */
+  private full_ = false;
 
   constructor(
     bus: Bus,
     client: ApiClient,
     queue: CommandQueue,
     store: SessionStore,
-    onResidual: (residual: Residual | null) => void,
+    onLookAhead: (ahead: LookAhead) => void,
   ) {
     this.bus_ = bus;
     this.client_ = client;
@@ -55,8 +81,13 @@ export class TransformEditor {
         end: () => client.endPreview(store.id),
       },
       {
-        onResidual,
-        onAhead: () => bus.fire("preview.changed", { state: "preview", latencyMs: 0, samplesPerSecond: 0 }),
+        onLookAhead,
+        onAhead: (covered) =>
+          bus.fire("preview.changed", {
+            state: covered ? "preview" : "waiting",
+            latencyMs: 0,
+            samplesPerSecond: 0,
+          }),
         onExact: (latencyMs) => {
           const samplesPerSecond = latencyMs > 0 ? (store.document.sample_count / latencyMs) * 1000 : 0;
           bus.fire("preview.changed", { state: "exact", latencyMs, samplesPerSecond });
@@ -78,6 +109,8 @@ export class TransformEditor {
   get state(): TransformState {
     return {
       deformation: this.deformation_,
+      steps: allSteps(this.steps_, this.deformation_),
+      step: this.steps_.at,
       pivot: this.pivot_,
       axis: this.axis_,
       pivotEditing: this.pivotEditing_,
@@ -85,29 +118,113 @@ export class TransformEditor {
       level: this.level_,
       blend: this.blend_,
       gains: this.gains_,
-      obstacle: obstacleOf(this.store_.document),
+      obstacle:
+        obstacleOf(this.store_.document) ??
+        (this.full_ ? `An edit has at most ${MAX_STEPS} steps. Choose one of them, or apply.` : null),
     };
   }
 
   /** Whether something waits to be recorded or dropped. */
   get pending(): boolean {
-    return this.deformation_ !== null && (!isIdentity(this.deformation_) || this.changesDetail);
+    const whole = this.whole;
+    return whole !== null && (!isIdentity(whole) || this.changesDetail);
+  }
+
+  /** Several steps make one edit: changing the tool goes to another step. */
+  get composing(): boolean {
+    return this.steps_.others.length > 0;
   }
 
   /** The edit as it stands, in words; empty where nothing is pending. */
   get description(): string {
-    return this.deformation_ && this.pending ? describeEdit(this.body(this.deformation_)) : "";
+    const whole = this.whole;
+    return whole && this.pending ? describeEdit(this.body(whole)) : "";
+  }
+
+  /** All steps together. */
+  private get whole(): Deformation | null {
+    return composed(this.steps_, this.deformation_);
   }
 
   private get changesDetail(): boolean {
     return this.gains_.some((gain, band) => band >= this.level_ && gain !== 1);
   }
 
-  set(deformation: Deformation): void {
+  /** The current step. */
+  set(deformation: ElementaryDeformation): void {
     if (this.state.obstacle || deformationFault(deformation)) return;
     this.deformation_ = deformation;
-    this.preview.want(deformation);
+    this.again();
+  }
+
+  /** Takes up a kind of step: the current one where it is of that kind, else a new one behind what is there. */
+  begin(kind: TransformKind): void {
+    this.full_ = false;
+    if (!this.composing) return;
+    if (this.deformation_ && KIND_OF_TYPE[this.deformation_.type] === kind) return;
+    this.addStep();
+    this.full_ = this.deformation_ !== null;
+    if (this.full_) this.tell();
+    if (kind !== "normal") return;
+    const known = normalStep(this.steps_, this.deformation_);
+    if (known >= 0) this.chooseStep(known);
+    else this.steps_ = withNormalFirst(this.steps_);
     this.tell();
+  }
+
+  /** Whether what is pending goes on under another tool, rather than being recorded when it is left. */
+  keeps(next: ToolName): boolean {
+    const kind = TRANSFORM_KINDS.find((each) => each === next);
+    if (!kind) return false;
+    return this.composing || (this.deformation_ !== null && KIND_OF_TYPE[this.deformation_.type] === kind);
+  }
+
+  /** Sets the current step down and begins another one; false where there is nothing to set down, or no room. */
+  addStep(): boolean {
+    const steps = withStepAdded(this.steps_, this.deformation_);
+    if (!steps) {
+      // An empty step takes another kind as it is.
+      if (this.deformation_ && isIdentity(this.deformation_)) this.deformation_ = null;
+      this.tell();
+      return false;
+    }
+    this.steps_ = steps;
+    this.deformation_ = null;
+    this.pivotEditing_ = false;
+    this.tell();
+    return true;
+  }
+
+  /** Goes to a step; answers the tool that it belongs to. */
+  chooseStep(place: number): TransformKind | null {
+    const chosen = withStepChosen(this.steps_, this.deformation_, place);
+    if (!chosen) return null;
+    this.takeStep(chosen.steps, chosen.current);
+    return KIND_OF_TYPE[chosen.current.type];
+  }
+
+  /** Takes a step away; answers the tool of the one that is current then. */
+  removeStep(place: number): TransformKind | null {
+    const { steps, current } = withoutStep(this.steps_, this.deformation_, place);
+    this.takeStep(steps, current);
+    return current && KIND_OF_TYPE[current.type];
+  }
+
+  /** Changes the places of a step and the next one. */
+  swapSteps(first: number): void {
+    this.steps_ = withSwapped(this.steps_, this.deformation_, first);
+    this.again();
+  }
+
+  private takeStep(steps: Steps, current: ElementaryDeformation | null): void {
+    this.full_ = false;
+    this.steps_ = steps;
+    this.deformation_ = current;
+    this.pivotEditing_ = false;
+    if (current) this.pivot_ = pivotOf(current) ?? this.pivot_;
+    if (current?.type === "twist")
+      this.twist_ = { direction: current.axis.direction, length: current.length };
+    this.again();
   }
 
   /** What turns and twists turn about and what a scale leaves in place, in model space. */
@@ -163,7 +280,9 @@ export class TransformEditor {
 
   /** The same deformation under other conditions. */
   private again(): void {
-    if (this.deformation_) this.preview.want(this.deformation_);
+    const whole = this.whole;
+    const gains = this.changesDetail ? this.gains_.join(" ") : "";
+    if (whole) this.preview.want(whole, { blend: this.blend_, gains });
     this.tell();
   }
 
@@ -179,14 +298,14 @@ export class TransformEditor {
 
   /** Records the transform; afterwards nothing is pending, or, where the server refuses, it is pending still. */
   async commit(): Promise<void> {
-    const deformation = this.deformation_;
-    if (!deformation || !this.pending) return;
+    const whole = this.whole;
+    if (!whole || !this.pending) return;
     await this.queue_.enqueue(async () => {
       await this.preview.idle();
       const revision = this.store_.document.revision;
       this.committing_ = revision;
       try {
-        const edit = this.body(deformation);
+        const edit = this.body(whole);
         await this.client_.commitEdit(this.store_.id, edit, revision);
         this.settle();
         this.store_.update(await this.client_.session(this.store_.id));
@@ -209,6 +328,8 @@ export class TransformEditor {
 
   private clear(): void {
     this.deformation_ = null;
+    this.steps_ = ONE_STEP;
+    this.full_ = false;
     this.gains_ = this.gains_.map(() => 1);
   }
 

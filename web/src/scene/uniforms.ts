@@ -1,4 +1,5 @@
 import { type Texture, type Vector2, Vector3 } from "three";
+import type { Blend } from "../api/types";
 import type { Residual } from "../edits/residual";
 import { normalise } from "../math/vec3";
 import { ONE_COLOR, ZERO_COLOR } from "./region-colors";
@@ -63,6 +64,7 @@ export function createUniforms(viewport: Vector2, textures: PassTextures): PassU
     residualPoint: { value: new Vector3() },
     residualFrom: { value: new Vector3() },
     residualAmount: { value: 0 },
+    residualBlend: { value: 0 },
     mode: { value: 0 },
     tintRegions: { value: true },
     colormap: { value: null },
@@ -115,11 +117,14 @@ const RESIDUAL_KINDS: Record<Residual["kind"], number> = {
   twist: 4,
   along_normal: 5,
 };
+/** As the vertex shader numbers them; 0 leaves t as it is. */
+const BLENDS: Record<Blend, number> = { quartic: 0, cubic: 1, quintic: 2, cosine: 3 };
 const RADIANS = Math.PI / 180;
 
 /** The deformation that the splats add to the server's last frame, in scene coordinates; false where nothing changed. */
-export function setResidual(splat: Uniforms, residual: Residual | null): boolean {
+export function setResidual(splat: Uniforms, residual: Residual | null, blend: Blend | null): boolean {
   if (!residual && splat["residualKind"]?.value === 0) return false;
+  setUniform(splat, "residualBlend", blend ? BLENDS[blend] : 0);
   setUniform(splat, "residualKind", residual ? RESIDUAL_KINDS[residual.kind] : 0);
   const vector = vectorUniform(splat, "residualVector");
   if (residual && "point" in residual) vectorUniform(splat, "residualPoint").set(...residual.point);

@@ -1,9 +1,12 @@
 import { Scene, WebGLRenderer } from "three";
+import type { Blend } from "../api/types";
 import type { Residual } from "../edits/residual";
-import type { Vec3 } from "../math/vec3";
+import { distance, type Vec3 } from "../math/vec3";
+import { worldPerPixel } from "./camera-math";
 import { CameraRig } from "./camera-rig";
 import { DEFAULT_DISPLAY, type DisplaySettings } from "./display";
 import { prefixWithin } from "./layers";
+import { OutlineLayer } from "./outline-layer";
 import { Pacer } from "./pacer";
 import { Passes } from "./passes";
 import { type Hit, Picker } from "./picker";
@@ -11,6 +14,7 @@ import { type RegionCentres, regionCentres } from "./region-centres";
 import { SampleSurface, type SurfaceBlock, type SurfaceLayout } from "./sample-surface";
 import { StrokeMask } from "./stroke-mask";
 import { setResidual, setUniform, vectorUniform } from "./uniforms";
+import { type FocusPlane, squareView } from "./view-matrix";
 
 /** Pixels that the targets hold at most; beyond, the picture is drawn at a lower ratio and scaled up. */
 const MAX_PIXELS = 8_500_000;
@@ -40,6 +44,7 @@ export class Viewport {
   /** Drawn over the picture: the gizmo. */
   readonly overlay = new Scene();
   readonly mask: StrokeMask;
+  readonly outline: OutlineLayer;
   /** After each picture; for the status line and the tests. */
   onDrawn: (() => void) | null = null;
   onContext: ((lost: boolean) => void) | null = null;
@@ -76,6 +81,7 @@ export class Viewport {
       "View of the surface. Arrow keys turn it, plus and minus zoom, F frames it.",
     );
     container.append(this.canvas);
+    this.outline = new OutlineLayer(container);
     const gl = this.gl;
     if (!gl.getExtension("EXT_color_buffer_float"))
       throw new Error("This browser's WebGL 2 cannot draw into float textures.");
@@ -166,9 +172,9 @@ export class Viewport {
     this.invalidate();
   }
 
-  /** The deformation that the picture adds to the server's last frame, in scene coordinates. */
-  setResidual(residual: Residual | null): void {
-    if (setResidual(this.passes_.uniforms.splat, residual)) this.invalidate();
+  /** The deformation that the picture adds to the server's last frame, in scene coordinates, and the blend of its t. */
+  setResidual(residual: Residual | null, blend: Blend | null): void {
+    if (setResidual(this.passes_.uniforms.splat, residual, blend)) this.invalidate();
   }
 
   setRing(ring: BrushRing | null): void {
@@ -187,6 +193,50 @@ export class Viewport {
   pick(clientX: number, clientY: number): Hit | null {
     const box = this.canvas.getBoundingClientRect();
     return this.picker_.pick((clientX - box.left) / box.width, (clientY - box.top) / box.height);
+  }
+
+  /** A frame of this revision is on the screen whole: what stood in for it goes. */
+  frameShown(revision: number): void {
+    this.mask.frameShown(revision);
+    this.outline.frameShown(revision);
+  }
+
+  get size(): { width: number; height: number } {
+    return { width: this.container_.clientWidth, height: this.container_.clientHeight };
+  }
+
+  /** Where an event is in the picture, in pixels from its upper left corner. */
+  pixelOf(event: MouseEvent): readonly [number, number] {
+    const box = this.canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  /** Model to the clip space of the square view, for a model whose origin is at `origin`. */
+  squareView(origin: Vec3): number[] {
+    const { camera } = this.rig;
+    camera.updateMatrixWorld();
+    return squareView(
+      camera.projectionMatrix.elements,
+      camera.matrixWorldInverse.elements,
+      origin,
+      this.size,
+    );
+  }
+
+  /** The plane through the point that the camera turns about, facing the camera, in scene coordinates. */
+  focusPlane(): FocusPlane {
+    const { camera, state } = this.rig;
+    const { width, height } = this.size;
+    camera.updateMatrixWorld();
+    const axis = (column: number): Vec3 =>
+      [0, 1, 2].map((row) => camera.matrixWorld.elements[4 * column + row] ?? 0) as unknown as Vec3;
+    return {
+      focus: state.target,
+      focusPixel: [width / 2, height / 2],
+      right: axis(0),
+      up: axis(1),
+      perPixel: worldPerPixel(distance(state.position, state.target), height),
+    };
   }
 
   regionCentres(): RegionCentres {

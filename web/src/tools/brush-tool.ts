@@ -1,66 +1,62 @@
-import type { RegionName, SessionDocument } from "../api/types";
+import type { SessionDocument } from "../api/types";
+import { modeOf, type PaintMode, type PaintSettingsStore, type PaintTarget } from "../edits/paint-settings";
 import type { RegionEditor } from "../edits/regions";
-import type { ToolName } from "../event-map";
 import { add, normalise, type Vec3 } from "../math/vec3";
 import type { Hit } from "../scene/picker";
 import { ONE_COLOR, ZERO_COLOR } from "../scene/region-colors";
 import type { Viewport } from "../scene/viewport";
 import type { SessionStore } from "../session-store";
+import type { PaintGesture } from "./paint-tool";
 import { isDepthJump, isNewVertex, strokeOperation } from "./stroke";
-import type { Tool } from "./tool";
-
-export type BrushKind = "zero" | "one" | "erase";
 
 type Color = readonly [number, number, number];
 const ERASER_COLOR: Color = [0.86, 0.87, 0.9];
-const COLORS: Record<BrushKind, Color> = { zero: ZERO_COLOR, one: ONE_COLOR, erase: ERASER_COLOR };
+const COLORS: Record<PaintTarget, Color> = { zero: ZERO_COLOR, one: ONE_COLOR, erase: ERASER_COLOR };
 const BARE_COLOR: Color = [0.66, 0.64, 0.6];
 
-/** The brush's radius, shared by the three brushes, in model units. */
+/** The brush's radius, in model units; lines are as wide. */
 export interface BrushSize {
   radius: number;
 }
 
 interface Stroke {
   pointer: number;
-  kind: BrushKind;
+  mode: PaintMode;
   parts: Vec3[][];
   last: Hit;
   towardsCamera: Vec3;
 }
 
 /** Paints on the surface: the stroke shows at once, and becomes operations of the region when the hand lifts. */
-export class BrushTool implements Tool {
-  readonly name: ToolName;
-  private readonly kind_: BrushKind;
+export class BrushTool implements PaintGesture {
+  private target_: PaintTarget = "zero";
   private readonly viewport_: Viewport;
   private readonly store_: SessionStore;
   private readonly regions_: RegionEditor;
   private readonly size_: BrushSize;
+  private readonly settings_: PaintSettingsStore;
   private listeners_: AbortController | null = null;
   private stroke_: Stroke | null = null;
-  private pointer_: { x: number; y: number; shift: boolean } | null = null;
+  private pointer_: { x: number; y: number; mode: PaintMode } | null = null;
   private frame_ = 0;
   private strokes_ = 0;
 
   constructor(
-    kind: BrushKind,
     viewport: Viewport,
     store: SessionStore,
     regions: RegionEditor,
     size: BrushSize,
+    settings: PaintSettingsStore,
   ) {
-    this.name = kind;
-    this.kind_ = kind;
     this.viewport_ = viewport;
     this.store_ = store;
     this.regions_ = regions;
     this.size_ = size;
+    this.settings_ = settings;
   }
 
-  activate(): void {
-    this.viewport_.rig.setPainting(true);
-    this.viewport_.canvas.classList.add("painting");
+  activate(target: PaintTarget): void {
+    this.target_ = target;
     this.listeners_ = new AbortController();
     const { signal } = this.listeners_;
     const canvas = this.viewport_.canvas;
@@ -71,7 +67,6 @@ export class BrushTool implements Tool {
     canvas.addEventListener("pointerup", this.up, { signal });
     canvas.addEventListener("pointercancel", this.abandon, { signal });
     canvas.addEventListener("pointerleave", this.leave, { signal });
-    canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
   }
 
   deactivate(): void {
@@ -79,9 +74,13 @@ export class BrushTool implements Tool {
     this.listeners_?.abort();
     cancelAnimationFrame(this.frame_);
     this.frame_ = 0;
-    this.viewport_.canvas.classList.remove("painting");
-    this.viewport_.rig.setPainting(false);
     this.viewport_.setRing(null);
+  }
+
+  cancel(): boolean {
+    const begun = this.stroke_ !== null;
+    this.abandon();
+    return begun;
   }
 
   /** Draws the ring again, for a radius that has changed under a resting hand. */
@@ -97,22 +96,26 @@ export class BrushTool implements Tool {
     event.stopPropagation();
     this.viewport_.canvas.focus({ preventScroll: true });
     this.viewport_.canvas.setPointerCapture(event.pointerId);
-    const kind = event.shiftKey ? "erase" : this.kind_;
+    const mode = modeOf(this.settings_.value, this.target_, event);
     this.stroke_ = {
       pointer: event.pointerId,
-      kind,
+      mode,
       parts: [[hit.position]],
       last: hit,
       towardsCamera: hit.towardsCamera,
     };
     this.viewport_.rig.setEnabled(false);
-    this.viewport_.mask.begin(kind === "erase" ? BARE_COLOR : COLORS[kind]);
+    this.viewport_.mask.begin(mode === "remove" ? BARE_COLOR : COLORS[this.target_]);
     this.viewport_.mask.add(hit.position, hit.position, this.size_.radius);
-    this.showRing(hit, kind);
+    this.showRing(hit, mode);
   };
 
   private readonly move = (event: PointerEvent): void => {
-    this.pointer_ = { x: event.clientX, y: event.clientY, shift: event.shiftKey };
+    this.pointer_ = {
+      x: event.clientX,
+      y: event.clientY,
+      mode: modeOf(this.settings_.value, this.target_, event),
+    };
     const stroke = this.stroke_;
     if (!stroke) {
       if (event.buttons === 0) this.scheduleRing();
@@ -127,7 +130,7 @@ export class BrushTool implements Tool {
   private extend(stroke: Stroke, event: PointerEvent): void {
     const hit = this.viewport_.pick(event.clientX, event.clientY);
     if (!hit) return;
-    this.showRing(hit, stroke.kind);
+    this.showRing(hit, stroke.mode);
     const { radius } = this.size_;
     const part = stroke.parts[stroke.parts.length - 1];
     if (!part || !isNewVertex(part[part.length - 1], hit.position, radius)) return;
@@ -175,18 +178,15 @@ export class BrushTool implements Tool {
 
   private send(stroke: Stroke): Promise<SessionDocument | null> {
     const facing = normalise(stroke.towardsCamera);
-    const erasing = stroke.kind === "erase";
     const operations = stroke.parts.map((part) =>
       strokeOperation(
         part.map((p) => this.store_.toModel(p)),
         this.size_.radius,
         facing,
-        erasing,
+        stroke.mode === "remove",
       ),
     );
-    return erasing
-      ? this.regions_.erase(operations)
-      : this.regions_.paint(stroke.kind as RegionName, operations);
+    return this.regions_.paint(this.target_, operations);
   }
 
   private scheduleRing(): void {
@@ -196,12 +196,13 @@ export class BrushTool implements Tool {
       const pointer = this.pointer_;
       if (!pointer || this.stroke_) return;
       const hit = this.viewport_.pick(pointer.x, pointer.y);
-      if (hit) this.showRing(hit, pointer.shift ? "erase" : this.kind_);
+      if (hit) this.showRing(hit, pointer.mode);
       else this.viewport_.setRing(null);
     });
   }
 
-  private showRing(hit: Hit, kind: BrushKind): void {
-    this.viewport_.setRing({ position: hit.position, radius: this.size_.radius, color: COLORS[kind] });
+  private showRing(hit: Hit, mode: PaintMode): void {
+    const color = COLORS[mode === "remove" ? "erase" : this.target_];
+    this.viewport_.setRing({ position: hit.position, radius: this.size_.radius, color });
   }
 }

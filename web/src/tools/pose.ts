@@ -1,10 +1,11 @@
-import type { Deformation } from "../api/types";
+import type { ElementaryDeformation } from "../api/types";
 import {
   alongNormal,
   GREATEST_FACTOR,
   LEAST_FACTOR,
   rotation,
   scaling,
+  towardPoint,
   translation,
   twisting,
 } from "../edits/deformation";
@@ -46,7 +47,7 @@ export function poseOf(kind: TransformKind, state: TransformState): GizmoPose {
   }
 }
 
-function turned(deformation: Deformation | null): AxisAngle | undefined {
+function turned(deformation: ElementaryDeformation | null): AxisAngle | undefined {
   if (deformation?.type !== "rotation" && deformation?.type !== "twist") return undefined;
   return { direction: normalise(deformation.axis.direction), angleDeg: deformation.angle_deg };
 }
@@ -57,7 +58,11 @@ function factorOf(scale: number): number {
 }
 
 /** The deformation of that kind that the handles' pose, in model space, means. */
-export function deformationOf(kind: TransformKind, state: TransformState, pose: GizmoPose): Deformation {
+export function deformationOf(
+  kind: TransformKind,
+  state: TransformState,
+  pose: GizmoPose,
+): ElementaryDeformation {
   const { pivot, deformation, twist } = state;
   switch (kind) {
     case "move":
@@ -73,6 +78,8 @@ export function deformationOf(kind: TransformKind, state: TransformState, pose: 
       const known = turned(deformation) ?? { direction: normalise(twist.direction), angleDeg: 0 };
       return twisting(pivot, twist.direction, axisAngleOf(about, known).angleDeg, twist.length);
     }
+    case "toward":
+      return towardPoint(pose.position, deformation?.type === "toward_point" ? deformation.amount : 0);
     case "normal":
       return alongNormal(deformation?.type === "along_normal" ? deformation.distance : 0);
   }

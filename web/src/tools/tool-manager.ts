@@ -18,6 +18,7 @@ export class ToolManager {
     first.activate();
     bus.function("tool.activate", (name) => this.activate(name));
     bus.function("tool.current", () => this.current_.name);
+    bus.function("tool.cancel", () => this.current_.cancel?.() ?? false);
   }
 
   get current(): ToolName {
@@ -27,7 +28,7 @@ export class ToolManager {
   activate(name: ToolName): void {
     const next = this.tools_.get(name);
     if (!next || next === this.current_) return;
-    this.current_.deactivate();
+    this.current_.deactivate(name);
     this.current_ = next;
     next.activate();
     this.bus_.fire("tool.changed", name);

@@ -1,5 +1,5 @@
 import type { TransformEditor } from "../edits/transform";
-import type { TransformKind, TransformState } from "../event-map";
+import type { ToolName, TransformKind, TransformState } from "../event-map";
 import { distance, normalise, subtract } from "../math/vec3";
 import type { Gizmo, GizmoMode, GizmoPose } from "../scene/gizmo";
 import type { Viewport } from "../scene/viewport";
@@ -14,7 +14,11 @@ const MODES: Record<TransformKind, GizmoMode | null> = {
   scale: "scale",
   twist: "rotate",
   normal: null,
+  // The handle is the target.
+  toward: "translate",
 };
+/** A press that moves further is no click. */
+const CLICK_PX = 4;
 
 /** Deforms with the one-region by handles. Leaving the tool records what is pending; Escape drops it. */
 export class TransformTool implements Tool {
@@ -27,6 +31,7 @@ export class TransformTool implements Tool {
   private listeners_: AbortController | null = null;
   private unlisten_: (() => void)[] = [];
   private active_ = false;
+  private pressed_ = { x: 0, y: 0 };
 
   constructor(
     name: TransformKind,
@@ -46,11 +51,18 @@ export class TransformTool implements Tool {
 
   activate(): void {
     this.active_ = true;
+    this.editor_.begin(this.name);
     this.editor_.setAxis(null);
     this.centrePivot();
     this.gizmo_.onDrag = (pose) => this.dragged(pose);
     this.listeners_ = new AbortController();
-    this.viewport_.canvas.addEventListener("dblclick", this.doubleClick, { signal: this.listeners_.signal });
+    const { signal } = this.listeners_;
+    const { canvas } = this.viewport_;
+    canvas.addEventListener("dblclick", this.doubleClick, { signal });
+    if (this.name === "toward") {
+      canvas.addEventListener("pointerdown", this.press, { signal });
+      canvas.addEventListener("click", this.click, { signal });
+    }
     this.unlisten_ = [
       this.bus_.on("transform.changed", (state) => this.follow(state)),
       this.bus_.on("history.changed", () => this.centrePivot()),
@@ -58,19 +70,22 @@ export class TransformTool implements Tool {
     this.follow(this.editor_.state);
   }
 
-  deactivate(): void {
+  deactivate(next: ToolName): void {
     this.active_ = false;
     for (const end of this.unlisten_) end();
     this.listeners_?.abort();
     this.gizmo_.onDrag = null;
     this.gizmo_.hide();
+    // Another kind is another step.
+    if (this.editor_.keeps(next)) return;
     if (this.editor_.pending) void this.editor_.commit();
     else this.editor_.cancel();
   }
 
   /** Puts the pivot where the transform most likely starts: between the regions, or amid what moves or stays. */
   private centrePivot(): void {
-    if (this.editor_.state.obstacle || this.editor_.pending) return;
+    const { obstacle, deformation } = this.editor_.state;
+    if (obstacle || (this.editor_.composing ? deformation !== null : this.editor_.pending)) return;
     const { zero, one, boundary } = this.viewport_.regionCentres();
     if (this.name === "twist" && zero && one && distance(zero, one) > 0) {
       // From the middle of what stays to the middle of what moves, which turns by the whole angle.
@@ -85,7 +100,7 @@ export class TransformTool implements Tool {
   private dragged(pose: GizmoPose): void {
     const { state } = this.editor_;
     const inModel = { ...pose, position: this.store_.toModel(pose.position) };
-    if (state.pivotEditing) this.editor_.setPivot(inModel.position);
+    if (state.pivotEditing || this.name === "toward") this.editor_.setPivot(inModel.position);
     else this.editor_.set(deformationOf(this.name, state, inModel));
   }
 
@@ -105,6 +120,15 @@ export class TransformTool implements Tool {
     const inScene = { ...pose, position: this.store_.toScene(pose.position) };
     this.gizmo_.show(state.pivotEditing ? "translate" : mode, inScene, twists);
   }
+
+  private readonly press = ({ clientX: x, clientY: y }: PointerEvent): void => {
+    this.pressed_ = { x, y };
+  };
+
+  private readonly click = (event: MouseEvent): void => {
+    const moved = Math.hypot(event.clientX - this.pressed_.x, event.clientY - this.pressed_.y);
+    if (moved < CLICK_PX) this.doubleClick(event);
+  };
 
   private readonly doubleClick = (event: MouseEvent): void => {
     if (this.gizmo_.hovered || !MODES[this.name]) return;

@@ -52,7 +52,7 @@ export function createEditOptions(session: SessionDocument, editor: TransformEdi
   const aside = h("span", { class: "section-aside" });
   const detail = h(
     "details",
-    { class: "sub" },
+    { class: "sub", data: { part: "detail" } },
     h("summary", {}, h("span", { class: "sub-title" }, "Detail"), aside, icon("chevron")),
     h(
       "div",

@@ -6,11 +6,11 @@ import { formatAge, formatCount } from "./format";
 import { icon } from "./icons";
 import { createSection } from "./section";
 
-/** Every edit, with the state that is shown now; a click goes there. */
-export function createHistoryPanel(bus: Bus): HTMLElement {
+/** Every edit, with the state that is shown now; a click goes there. `playback`: what is done with all of them. */
+export function createHistoryPanel(bus: Bus, playback: HTMLElement): HTMLElement {
   const section = createSection("History");
   const list = h("ol", { class: "history" });
-  section.body.append(list);
+  section.body.append(list, playback);
 
   const entry = (label: string, detail: string, edit: number, head: number): HTMLElement => {
     const state = edit === head ? "current" : edit > head ? "undone" : "done";

@@ -1,56 +1,57 @@
-import type { RegionName, RegionOperation, SessionDocument, Shape } from "../api/types";
-import type { RegionEditor } from "../edits/regions";
+import type { RegionName, SessionDocument, Shape, ShapeOperation } from "../api/types";
+import type { PaintMode } from "../edits/paint-settings";
+import type { RegionCommand, RegionEditor } from "../edits/regions";
 import type { Bus, SessionStore } from "../session-store";
 import { append, h, replaceChildren, setText } from "./dom";
-import { numberField, rangeField, selectField, vectorField } from "./fields";
-import { formatCount, formatLength } from "./format";
+import { numberField, selectField, vectorField } from "./fields";
+import { formatCount } from "./format";
 import { icon } from "./icons";
+import { createPaintOptions } from "./paint-options";
 import { createSection } from "./section";
 
 const NAMES: Record<RegionName, string> = { zero: "Zero-region", one: "One-region" };
 const MEANINGS: Record<RegionName, string> = { zero: "stays", one: "moves" };
 
 type ShapeType = "sphere" | "box" | "half_space" | "all";
-type Mode = RegionOperation["mode"];
+type Mode = PaintMode | "set";
 
-/** The painting: what each region holds, the brush's size, and shapes by numbers for those who paint without a mouse. */
+/**
+ * The painting: what each region holds and what is done to it as a whole, what the chosen method asks for, and shapes by
+ * numbers for those who paint without a mouse. `reach`: how far regions grow and shrink; `forms`: further sources of shapes.
+ */
 export function createRegionsPanel(
   bus: Bus,
   store: SessionStore,
   regions: RegionEditor,
   radius: number,
+  reach: { value: number },
+  ...forms: HTMLElement[]
 ): HTMLElement {
   const section = createSection("Regions");
-  const rows = (["zero", "one"] as const).map((region) => regionRow(bus, store, regions, region));
-  const diagonal = store.document.diagonal;
-  // The slider runs over the logarithm: each step changes the radius by the same part.
-  const toSlider = (value: number): number => Math.log(value / diagonal);
-  const brush = rangeField(
-    "Brush radius",
-    { min: Math.log(5e-4), max: Math.log(0.5), step: 0.01 },
-    toSlider(radius),
-    (value) => formatLength(diagonal * Math.exp(value)),
-    (value) => bus.invoke("brush.set", diagonal * Math.exp(value)),
-  );
-  bus.on("brush.radius", (value) => brush.set(toSlider(value)));
+  const rows = (["zero", "one"] as const).map((region) => regionRow(bus, store, regions, region, reach));
   append(section.body, [
     h("div", { class: "region-rows" }, ...rows),
-    brush.element,
-    h(
-      "p",
-      { class: "hint" },
-      "Drag on the surface to paint, Shift erases, ",
-      h("kbd", {}, "["),
-      " ",
-      h("kbd", {}, "]"),
-      " size.",
-    ),
+    createPaintOptions(bus, store, radius),
     shapeForm(store, regions),
+    ...forms,
   ]);
   return section.element;
 }
 
-function regionRow(bus: Bus, store: SessionStore, regions: RegionEditor, region: RegionName): HTMLElement {
+const COMMANDS: readonly (readonly [RegionCommand, string, string])[] = [
+  ["all", "All", "Every sample joins"],
+  ["invert", "Invert", "Members leave, all others join"],
+  ["grow", "Grow", "Samples within the distance join"],
+  ["shrink", "Shrink", "Members within the distance of its border leave"],
+];
+
+function regionRow(
+  bus: Bus,
+  store: SessionStore,
+  regions: RegionEditor,
+  region: RegionName,
+  reach: { value: number },
+): HTMLElement {
   const count = h("span", { class: "region-count" });
   const clear = h(
     "button",
@@ -59,14 +60,61 @@ function regionRow(bus: Bus, store: SessionStore, regions: RegionEditor, region:
       class: "icon-button small",
       title: `Clear the ${region}-region`,
       aria: { label: `Clear the ${region}-region` },
-      onclick: () => void regions.clear(region),
+      onclick: () => void regions.command(region, "clear", 0),
     },
     icon("trash"),
+  );
+  const distance = numberField("Grow and shrink by", reach.value, {
+    unit: "units",
+    onChange: (value) => {
+      if (value > 0) reach.value = value;
+    },
+  });
+  const buttons = COMMANDS.map(([command, label, title]) =>
+    h(
+      "button",
+      {
+        type: "button",
+        class: "button quiet",
+        title,
+        data: { command },
+        onclick: () => {
+          const byDistance = command === "grow" || command === "shrink";
+          if (byDistance && !(distance.value > 0)) distance.input.focus();
+          else void regions.command(region, command, distance.value);
+        },
+      },
+      label,
+    ),
+  );
+  const drawer = h(
+    "div",
+    { class: "region-drawer", hidden: true, id: `region-${region}-commands` },
+    h("div", { class: "command-grid" }, ...buttons),
+    distance.element,
+  );
+  const more = h(
+    "button",
+    {
+      type: "button",
+      class: "icon-button small",
+      title: "All, invert, grow, shrink",
+      aria: { label: `More for the ${region}-region`, expanded: "false", controls: drawer.id },
+      onclick: () => {
+        drawer.hidden = !drawer.hidden;
+        more.setAttribute("aria-expanded", String(!drawer.hidden));
+        // The other region's drawer may have set it.
+        if (!drawer.hidden) distance.set(reach.value);
+      },
+    },
+    icon("more"),
   );
   const show = (document: SessionDocument): void => {
     const { samples } = document.regions[region];
     setText(count, samples === 0 ? "not painted" : `${formatCount(samples)} samples`);
     clear.disabled = samples === 0;
+    for (const button of buttons)
+      button.disabled = samples === 0 && ["grow", "shrink"].includes(button.dataset["command"] ?? "");
   };
   bus.on("session.changed", show);
   show(store.document);
@@ -76,7 +124,9 @@ function regionRow(bus: Bus, store: SessionStore, regions: RegionEditor, region:
     h("span", { class: "swatch", aria: { hidden: "true" } }),
     h("span", { class: "region-name" }, NAMES[region], h("small", {}, MEANINGS[region])),
     count,
+    more,
     clear,
+    drawer,
   );
 }
 
@@ -155,9 +205,10 @@ function shapeForm(store: SessionStore, regions: RegionEditor): HTMLElement {
     "form",
     {
       class: "shape-form",
+      data: { form: "numbers" },
       onsubmit: (event) => {
         event.preventDefault();
-        const operation: RegionOperation = { mode, shape: shapeOf[type]() };
+        const operation: ShapeOperation = { mode, shape: shapeOf[type]() };
         if (mode === "add" || mode === "set") operation.steal = true;
         void regions.paint(region, [operation]);
       },
@@ -167,5 +218,10 @@ function shapeForm(store: SessionStore, regions: RegionEditor): HTMLElement {
     fields,
     apply,
   );
-  return h("details", { class: "sub" }, h("summary", {}, "Shape by numbers", icon("chevron")), form);
+  return h(
+    "details",
+    { class: "sub" },
+    h("summary", {}, h("span", { class: "sub-title" }, "Shape by numbers"), icon("chevron")),
+    form,
+  );
 }

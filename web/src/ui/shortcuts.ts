@@ -1,3 +1,4 @@
+import { belongsToField } from "../keys";
 import { h, replaceChildren } from "./dom";
 import { icon } from "./icons";
 
@@ -9,19 +10,6 @@ export interface Shortcut {
   label: string;
   matches?: (event: KeyboardEvent) => boolean;
   run?: (event: KeyboardEvent) => void;
-}
-
-/** Whether a key belongs to the field that has the focus. */
-export function belongsToField(event: KeyboardEvent): boolean {
-  const target = event.target;
-  if (!(target instanceof HTMLElement)) return false;
-  if (
-    target.isContentEditable ||
-    target instanceof HTMLTextAreaElement ||
-    target instanceof HTMLSelectElement
-  )
-    return true;
-  return target instanceof HTMLInputElement && target.type !== "checkbox";
 }
 
 /** Matches a bare key, whatever the case. */

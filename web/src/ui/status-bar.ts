@@ -9,6 +9,11 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
   const timing = h("span", { class: "status-item", data: { status: "timing" } });
   const connection = h("span", { class: "status-item connection", data: { status: "connection" } });
   const badge = h("span", { class: "badge none", role: "status", data: { status: "badge" } });
+  const animation = h("span", { class: "badge none", role: "status", data: { status: "animation" } });
+  bus.on("animation.changed", ({ s }) => {
+    animation.className = `badge ${s === null ? "none" : "waiting"}`;
+    setText(animation, s === null ? "" : `Animation ${Math.round(100 * s)} %, not recorded · Esc leaves`);
+  });
   const radius = h("span", { class: "status-item", data: { status: "spacing" } });
 
   bus.on("load.changed", ({ loaded, total, complete }) => {
@@ -27,7 +32,9 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
   bus.on("session.changed", showSession);
   bus.on("preview.changed", ({ state, latencyMs, samplesPerSecond }) => {
     badge.className = `badge ${state}`;
+    badge.title = state === "waiting" ? "The picture shows what it can; the server computes the rest" : "";
     if (state === "preview") setText(badge, "Preview");
+    else if (state === "waiting") setText(badge, "Waiting for the server");
     else if (state === "exact") {
       setText(badge, "Exact");
       setText(timing, `${formatMs(latencyMs)} · ${formatRate(samplesPerSecond)}`);
@@ -49,6 +56,7 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
     samples,
     radius,
     h("span", { class: "spacer" }),
+    animation,
     timing,
     badge,
     revision,

@@ -24,6 +24,7 @@ const TOOLS: readonly (readonly ToolButton[])[] = [
     { name: "scale", icon: "scale", label: "Scale", key: "S" },
     { name: "twist", icon: "twist", label: "Twist", key: "T" },
     { name: "normal", icon: "normal", label: "Along normal", key: "N" },
+    { name: "toward", icon: "toward", label: "Toward a point", key: "A" },
   ],
 ];
 

@@ -31,9 +31,19 @@ export function createTopBar(bus: Bus, client: ApiClient, store: SessionStore): 
   redo.dataset["action"] = "redo";
   undo.disabled = true;
   redo.disabled = true;
-  bus.on("history.changed", ({ head, edits }) => {
-    undo.disabled = head === 0;
-    redo.disabled = head >= edits.length;
+  let edits = { undo: false, redo: false };
+  let painting = { undo: false, redo: false };
+  const refresh = (): void => {
+    undo.disabled = !edits.undo && !painting.undo;
+    redo.disabled = !edits.redo && !painting.redo;
+  };
+  bus.on("history.changed", ({ head, edits: { length } }) => {
+    edits = { undo: head > 0, redo: head < length };
+    refresh();
+  });
+  bus.on("painting.history", (next) => {
+    painting = next;
+    refresh();
   });
   const link = h(
     "button",

@@ -1,4 +1,12 @@
-import { AXES, alongNormal, rotation, scaling, translation, twisting } from "../edits/deformation";
+import {
+  AXES,
+  alongNormal,
+  rotation,
+  scaling,
+  towardPoint,
+  translation,
+  twisting,
+} from "../edits/deformation";
 import type { TransformEditor } from "../edits/transform";
 import type { TransformKind, TransformState } from "../event-map";
 import { isFiniteVec3, length, type Vec3 } from "../math/vec3";
@@ -38,6 +46,7 @@ export function createKindFields(editor: TransformEditor, diagonal: number, comm
     scale: scaleFields(editor, pivotField(), onEnter),
     twist: twistFields(editor, pivotField(), onEnter),
     normal: normalFields(editor, diagonal, onEnter),
+    toward: towardFields(editor, onEnter),
   };
 }
 
@@ -154,5 +163,34 @@ function normalFields(editor: TransformEditor, diagonal: number, onEnter: () => 
       if (document.activeElement !== slider.input) slider.set(reach > 0 ? now / reach : 0);
     },
     digits: () => distance,
+  };
+}
+
+function towardFields(editor: TransformEditor, onEnter: () => void): KindFields {
+  const target = vectorField("Target", [0, 0, 0], {
+    onChange: () => {
+      if (isFiniteVec3(target.value)) editor.setPivot(target.value);
+    },
+    onEnter,
+  });
+  const set = (percent: number): void => editor.set(towardPoint(editor.state.pivot, percent / 100));
+  const amount = numberField("Amount", 0, { unit: "%", onChange: set, onEnter });
+  const slider = rangeField(
+    "Away – toward",
+    { min: -100, max: 100, step: 1 },
+    0,
+    (percent) => `${percent} %`,
+    set,
+  );
+  return {
+    elements: [target.element, amount.element, slider.element],
+    inputs: [...inputsOf([...target.fields, amount]), slider.input],
+    show({ deformation, pivot }) {
+      const now = deformation?.type === "toward_point" ? 100 * deformation.amount : 0;
+      target.set(pivot);
+      amount.set(now);
+      if (document.activeElement !== slider.input) slider.set(now);
+    },
+    digits: ({ axis }) => (axis ? target.fields["xyz".indexOf(axis) as 0 | 1 | 2] : amount),
   };
 }

@@ -6,10 +6,13 @@ import { append, h, replaceChildren, setText } from "./dom";
 import { createEditOptions } from "./edit-options";
 import { icon } from "./icons";
 import { createSection } from "./section";
+import { createStepsList } from "./steps-list";
 import { createKindFields } from "./transform-fields";
 
 export interface TransformPanel {
   element: HTMLElement;
+  /** Apply and Cancel: below all sections, so that no length of the panel hides them. */
+  foot: HTMLElement;
   /** Puts the cursor into the field that a typed digit belongs to; false where there is none. */
   type(character: string): boolean;
 }
@@ -35,6 +38,11 @@ const KINDS: Record<TransformKind, { label: string; title: string; hint: string 
     label: "Normal",
     title: "Along normal (N)",
     hint: "The surface rises along its normals, or is carved where the distance is negative.",
+  },
+  toward: {
+    label: "Toward",
+    title: "Toward a point (A)",
+    hint: "Click the surface, drag the handle or type to set the target; the amount draws the one-region there.",
   },
 };
 
@@ -114,7 +122,9 @@ export function createTransformPanel(
     { type: "button", class: "button", onclick: () => bus.invoke("edit.cancel") },
     "Cancel",
   );
-  const ends = h("div", { class: "button-row" }, apply, cancel);
+  // Stays in sight however long the panel is.
+  const ends = h("div", { class: "button-row panel-foot", hidden: true }, apply, cancel);
+  const steps = createStepsList(editor, (kind) => bus.invoke("tool.activate", kind));
   const summary = h("p", { class: "hint", aria: { live: "polite" } });
   const fields = h("div", { class: "transform-fields" });
   append(section.body, [kinds, fields, summary, options.detail]);
@@ -126,10 +136,14 @@ export function createTransformPanel(
       button.setAttribute("aria-pressed", String(button.dataset["kind"] === kind));
     if (!kind) replaceChildren(fields);
     else {
-      const handles = kind === "normal" ? null : h("div", { class: "field-row" }, axes, pivotButton);
-      replaceChildren(fields, ...numbers[kind].elements, handles, options.main, ends);
+      const handles =
+        kind === "normal"
+          ? null
+          : h("div", { class: "field-row" }, axes, kind === "toward" ? null : pivotButton);
+      replaceChildren(fields, ...numbers[kind].elements, handles, options.main, steps.element);
     }
     fields.hidden = kind === null;
+    ends.hidden = kind === null;
   };
   const show = (state: TransformState): void => {
     shown = state;
@@ -139,6 +153,7 @@ export function createTransformPanel(
       for (const input of numbers[kind].inputs) input.disabled = state.obstacle !== null;
     }
     options.show(state);
+    steps.show(state);
     const ready = state.obstacle === null && editor.pending;
     apply.disabled = !ready;
     cancel.disabled = !ready;
@@ -155,11 +170,14 @@ export function createTransformPanel(
     tool = name;
     layOut();
     show(editor.state);
+    // The numbers of the tool come into sight where the panel is longer than the window.
+    if (kindOf(tool)) fields.scrollIntoView({ block: "nearest" });
   });
   layOut();
   show(editor.state);
   return {
     element: section.element,
+    foot: ends,
     type(character) {
       const kind = kindOf(tool);
       if (!kind || shown.obstacle) return false;

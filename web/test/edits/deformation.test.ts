@@ -65,7 +65,7 @@ test("edits in words", () => {
     { type: "translation", vector: [1, 0, 0] },
     { type: "scale", center: O, factors: [2, 2, 2] },
   ] as const;
-  expect(describeDeformation({ type: "sequence", steps: [...steps] })).toBe("Moved 1, 0, 0, then Scaled 2×");
+  expect(describeDeformation({ type: "sequence", steps: [...steps] })).toBe("Moved 1, 0, 0, then scaled 2×");
   expect(describeEdit({ level: 0, deformation: twisting(O, Y, 90, 2) })).toBe("Twisted 90°");
   expect(describeEdit({ level: 0, deformation: twisting(O, Y, 90, 2), gains: [0, 1] })).toBe(
     "Twisted 90°, detail 0, 1×",

@@ -8,6 +8,7 @@ class Bench {
   readonly puts: { deformation: Deformation; sequence: number }[] = [];
   readonly residuals: (Residual | null)[] = [];
   readonly exact: number[] = [];
+  readonly covered: boolean[] = [];
   readonly errors: unknown[] = [];
   ended = 0;
   now = 0;
@@ -26,9 +27,9 @@ class Bench {
       },
     },
     {
-      onResidual: (residual) => this.residuals.push(residual),
+      onLookAhead: ({ residual }) => this.residuals.push(residual),
       onExact: (latency) => this.exact.push(latency),
-      onAhead: () => undefined,
+      onAhead: (covered) => this.covered.push(covered),
       onError: (error) => this.errors.push(error),
     },
     100,
@@ -114,4 +115,15 @@ test("a refused preview is told once and not sent again", async () => {
   await bench.answer();
   expect(bench.errors.length).toBe(1);
   expect(bench.puts.length).toBe(1);
+});
+
+test("what the picture cannot look ahead to is told", () => {
+  const bench = new Bench();
+  bench.sender.want(translation([1, 0, 0]), { blend: "cosine", gains: "" });
+  bench.sender.want(translation([1, 0, 0]), { blend: "cosine", gains: "0.5" });
+  expect(bench.covered).toEqual([true, false]);
+  bench.sender.frameShown(101);
+  bench.sender.want(translation([2, 0, 0]), { blend: "cosine", gains: "" });
+  bench.sender.want(translation([2, 0, 0]), { blend: "cubic", gains: "" });
+  expect(bench.covered.slice(2)).toEqual([true, false]);
 });

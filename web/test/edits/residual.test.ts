@@ -1,9 +1,16 @@
 import { expect, test } from "vitest";
-import type { Deformation } from "../../src/api/types";
-import { alongNormal, rotation, scaling, translation, twisting } from "../../src/edits/deformation";
-import { inScene, residual } from "../../src/edits/residual";
+import type { Blend, Deformation, ElementaryDeformation } from "../../src/api/types";
+import {
+  alongNormal,
+  rotation,
+  scaling,
+  towardPoint,
+  translation,
+  twisting,
+} from "../../src/edits/deformation";
+import { inScene, lookAhead, residual } from "../../src/edits/residual";
 import { subtract, type Vec3 } from "../../src/math/vec3";
-import { ahead, deform } from "../mock/deform";
+import { ahead, deform, reblended } from "../mock/deform";
 
 function expectVector(actual: Vec3, expected: Vec3, digits = 9): void {
   actual.forEach((value, axis) => {
@@ -52,6 +59,8 @@ test("the picture's coordinates start elsewhere", () => {
   }
 });
 
+const sequence = (...steps: ElementaryDeformation[]): Deformation => ({ type: "sequence", steps });
+
 /** The residual takes what is shown to what is wanted, for every t. */
 function expectComposes(shown: Deformation | null, wanted: Deformation | null): void {
   const rest = residual(shown, wanted);
@@ -84,6 +93,13 @@ test("what the hand is ahead of the server composes with the frame on the screen
   expectComposes(null, alongNormal(0.2));
   expectComposes(alongNormal(0.2), alongNormal(-0.1));
   expectComposes(alongNormal(0.2), null);
+  expectComposes(null, towardPoint(point, 0.4));
+  expectComposes(towardPoint(point, 0.4), towardPoint(point, -2));
+  expectComposes(towardPoint(point, 0.4), null);
+  const first = translation([1, 2, 3]);
+  expectComposes(first, sequence(first, rotation(point, axis, 50)));
+  expectComposes(sequence(first, rotation(point, axis, 50)), first);
+  expectComposes(sequence(first, twisting(point, axis, 50, 1)), sequence(first, twisting(point, axis, 9, 1)));
   expectComposes(translation([0, 0, 0]), twisting(point, axis, 90, 0.5));
   expectComposes(twisting(point, axis, 90, 0.5), translation([0, 0, 0]));
   expectComposes(rotation([0.1 + 0.2, 0.2 + 0.9, 0.3 - 0.3], axis, 20), rotation(point, axis, 50));
@@ -97,7 +113,47 @@ test("deformations that do not compose are left to the server", () => {
   expect(residual(twisting([0, 1, 0], [0, 1, 0], 5, 1), twisting([0, 0, 0], [0, 1, 0], 9, 1))).toBeNull();
   expect(residual(scaling([0, 0, 0], [2, 2, 2]), alongNormal(1))).toBeNull();
   const others: Deformation = { type: "toward_point", target: [1, 1, 1], amount: 1 };
-  expect(residual(null, others)).toBeNull();
+  // What was drawn into one point cannot be drawn out of it.
+  expect(residual(others, null)).toBeNull();
+  const two = sequence(translation([1, 0, 0]), rotation([0, 0, 0], [0, 1, 0], 5));
+  expect(residual(null, two)).toBeNull();
+  expect(residual(sequence(alongNormal(1), translation([1, 0, 0])), translation([1, 0, 0]))).toBeNull();
   expect(residual(others, translation([1, 0, 0]))).toBeNull();
   expect(residual(rotation([1, 0, 0], [0, 1, 0], 5), rotation([0, 0, 0], [0, 1, 0], 5))).toBeNull();
+});
+
+test("a quartic t turns into that of another blend", () => {
+  const blends: Record<Blend, (x: number) => number> = {
+    quartic: (x) => (x * x - 1) ** 2,
+    cubic: (x) => (1 - x) ** 2 * (1 + 2 * x),
+    quintic: (x) => (1 - x) ** 3 * (1 + 3 * x + 6 * x * x),
+    cosine: (x) => (1 + Math.cos(Math.PI * x)) / 2,
+  };
+  for (const [name, blend] of Object.entries(blends))
+    for (const x of [0, 0.01, 0.3, 0.7, 0.99, 1])
+      expect(reblended(blends.quartic(x), name as Blend)).toBeCloseTo(blend(x), 9);
+});
+
+test("the look ahead says whether it covers what is wanted", () => {
+  const plain = { blend: "quartic", gains: "" } as const;
+  const moved = (x: number, under: { blend: Blend; gains: string } = plain) => ({
+    deformation: translation([x, 0, 0]),
+    under,
+  });
+  const cosine = { blend: "cosine", gains: "" } as const;
+  expect(lookAhead(null, moved(1), "quartic")).toMatchObject({ covered: true, blend: null });
+  expect(lookAhead(null, moved(1, cosine), "quartic")).toMatchObject({ covered: true, blend: "cosine" });
+  expect(lookAhead(null, moved(1, cosine), null)).toMatchObject({ covered: false, blend: null });
+  expect(lookAhead(moved(1, cosine), moved(2, cosine), "cosine")).toMatchObject({
+    covered: true,
+    blend: null,
+  });
+  expect(lookAhead(moved(1), moved(2, cosine), "quartic")).toEqual({
+    residual: null,
+    blend: null,
+    covered: false,
+  });
+  expect(lookAhead(moved(1), moved(1, { ...plain, gains: "0" }), "quartic").covered).toBe(false);
+  const gone = { ...plain, gains: "0.5" };
+  expect(lookAhead(moved(1, gone), moved(2, gone), "quartic").covered).toBe(true);
 });

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { ApiClient } from "../../src/api/client";
 import type { SessionDocument } from "../../src/api/types";
 import { CommandQueue } from "../../src/command-queue";
-import { alongNormal, scaling, translation, twisting } from "../../src/edits/deformation";
+import { alongNormal, rotation, scaling, translation, twisting } from "../../src/edits/deformation";
 import { TransformEditor } from "../../src/edits/transform";
 import type { Notices, Questions } from "../../src/event-map";
 import { Events } from "../../src/events";
@@ -118,4 +118,63 @@ test("nothing is made without both regions, or of what the server refuses", asyn
   expect(ready.state.deformation).toBeNull();
   await editor.commit();
   expect(sent).toEqual([]);
+});
+
+test("steps are recorded as one edit, in their order", async () => {
+  const { editor, posted } = bench();
+  const [move, turn] = [translation([1, 0, 0]), rotation([0, 0, 0], [0, 1, 0], 30)];
+  expect(editor.addStep()).toBe(false);
+  editor.set(move);
+  expect(editor.composing).toBe(false);
+  expect(editor.keeps("rotate")).toBe(false);
+  expect(editor.addStep()).toBe(true);
+  expect(editor.composing).toBe(true);
+  expect(editor.keeps("rotate")).toBe(true);
+  expect(editor.keeps("orbit")).toBe(false);
+  editor.begin("rotate");
+  editor.set(turn);
+  expect(editor.chooseStep(0)).toBe("move");
+  expect(editor.state.deformation).toEqual(move);
+  editor.swapSteps(0);
+  await editor.commit();
+  expect(posted()[0]).toMatchObject({ deformation: { type: "sequence", steps: [turn, move] } });
+  expect(editor.state.steps).toEqual([null]);
+});
+
+test("along the normal goes first, and once", async () => {
+  const { editor, posted } = bench();
+  editor.set(translation([1, 0, 0]));
+  editor.addStep();
+  editor.begin("normal");
+  editor.set(alongNormal(0.5));
+  expect(editor.state.steps).toEqual([alongNormal(0.5), translation([1, 0, 0])]);
+  editor.begin("scale");
+  editor.set(scaling([0, 0, 0], [2, 2, 2]));
+  editor.begin("normal");
+  expect(editor.state.step).toBe(0);
+  editor.set(alongNormal(0.25));
+  await editor.commit();
+  expect(posted()[0]).toMatchObject({
+    deformation: {
+      type: "sequence",
+      steps: [alongNormal(0.25), translation([1, 0, 0]), scaling([0, 0, 0], [2, 2, 2])],
+    },
+  });
+});
+
+test("where there is no room for another step it is said, and none is lost", () => {
+  const { editor } = bench();
+  for (let i = 1; i < 8; ++i) {
+    editor.set(translation([i, 0, 0]));
+    expect(editor.addStep()).toBe(true);
+  }
+  editor.set(translation([8, 0, 0]));
+  editor.begin("rotate");
+  expect(editor.state.obstacle).toMatch(/at most 8 steps/);
+  editor.set(rotation([0, 0, 0], [0, 1, 0], 30));
+  expect(editor.state.steps).toHaveLength(8);
+  expect(editor.state.steps.at(-1)).toEqual(translation([8, 0, 0]));
+  expect(editor.removeStep(7)).toBe("move");
+  expect(editor.state.obstacle).toBeNull();
+  expect(editor.state.steps).toHaveLength(7);
 });

@@ -1,4 +1,4 @@
-import type { Deformation } from "../../src/api/types";
+import type { Blend, Deformation } from "../../src/api/types";
 import type { Residual } from "../../src/edits/residual";
 import { add, cross, dot, normalise, scale, subtract, type Vec3 } from "../../src/math/vec3";
 
@@ -37,6 +37,16 @@ export function deform(p: Vec3, deformation: Deformation, t: number, normal: Vec
     case "sequence":
       return deformation.steps.reduce((q, step) => deform(q, step, t, normal), p);
   }
+}
+
+/** `reblend` of src/scene/shaders/splat.ts, statement by statement. */
+export function reblended(t: number, blend: Blend): number {
+  if (blend === "quartic") return t;
+  const x = Math.sqrt(Math.max(0, 1 - Math.sqrt(t)));
+  const y = 1 - x;
+  if (blend === "cubic") return y * y * (1 + 2 * x);
+  if (blend === "quintic") return y * y * y * (1 + 3 * x + 6 * x * x);
+  return 0.5 + 0.5 * Math.cos(Math.PI * x);
 }
 
 /** What the vertex shader makes of a sample, statement by statement as `deformAhead` in src/scene/shaders/splat.ts has it. */

@@ -86,14 +86,29 @@ async function handleSession(
   }
   if (what === "samples") {
     response.writeHead(200, { "Content-Type": "application/octet-stream" });
-    response.end(query.get("format") === "frame" ? session.frame(null, 0) : "ply\n");
+    const s = Number(query.get("s") ?? 1);
+    response.end(query.get("format") === "frame" ? session.frame(null, 0, s) : "ply\n");
     return;
   }
+  if (what === "recipe" && method === "GET")
+    return json(response, 200, { recipe: 1, edits: session.edits.slice(0, session.head) });
   const body = method === "GET" ? null : await bodyOf(request);
   if (what === "regions" && operations === "operations") {
     const changed = session.paint(region as RegionName, body as RegionOperation);
     broadcast(session.frame(null, 0));
     return json(response, 200, { ...session.document(), changed });
+  }
+  if (what === "regions" && method === "GET")
+    return json(response, 200, { operations: session.operations[region as RegionName] });
+  if (what === "regions" && method === "PUT") {
+    session.put(region as RegionName, (body as { operations: RegionOperation[] }).operations);
+    broadcast(session.frame(null, 0));
+    return json(response, 200, session.document());
+  }
+  if (what === "recipe") {
+    for (const { edit } of (body as { recipe: { edits: { edit: EditBody }[] } }).recipe.edits)
+      session.commit(edit);
+    broadcast(session.frame(null, 0));
   }
   if (what === "regions" && method === "DELETE") {
     session.clear(region as RegionName);
@@ -133,6 +148,11 @@ createServer((request, response) => {
   }
   if (parts[1] === "sessions" && parts[2] === session.id)
     return void handleSession(request, response, parts.slice(3), url.searchParams);
+  if (parts[1] === "images" && request.method === "POST") {
+    request.resume();
+    const image = { id: "mockimage0000000000001", width: 256, height: 128, channels: 4, bytes: 1024 };
+    return json(response, 201, image);
+  }
   if (parts[1] === "clouds" && request.method === "GET") return json(response, 200, { clouds: [cloud] });
   if (parts[1] === "sessions" && request.method === "GET")
     return json(response, 200, { sessions: [session.document()] });

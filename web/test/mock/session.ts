@@ -3,6 +3,7 @@ import type {
   EditRecord,
   RegionName,
   RegionOperation,
+  ScreenShape,
   SessionDocument,
   Shape,
 } from "../../src/api/types";
@@ -92,19 +93,70 @@ export class MockSession {
 
   paint(region: RegionName, operation: RegionOperation): number {
     const own = region === "zero" ? 1 : 2;
+    const members = Array.from(this.marks.keys()).filter((i) => this.marks[i] === own);
+    const chosen = this.chosen(operation, members);
+    const isMember = new Set(members);
     let changed = 0;
     for (let i = 0; i < this.shape_.count; ++i) {
-      const facing = operation.facing ? dot(operation.facing, this.normal(i)) > 0 : true;
-      if (!facing || !contains(operation.shape, this.position(i))) continue;
       const mark = this.marks[i] ?? 0;
-      const next =
-        operation.mode === "remove" ? (mark === own ? 0 : mark) : mark === 0 || operation.steal ? own : mark;
+      const joins = chosen.has(i);
+      let member = isMember.has(i);
+      if (operation.mode === "remove") member &&= !joins;
+      else if (operation.mode === "intersect") member &&= joins;
+      else if (operation.mode === "set" || operation.mode === "invert" || operation.mode === "clear")
+        member = joins;
+      else if (operation.mode === "shrink") member &&= !joins;
+      else member ||= joins;
+      const free = mark === 0 || mark === own || operation.steal;
+      const next = member && free ? own : mark === own ? 0 : mark;
       if (next !== mark) ++changed;
       this.marks[i] = next;
     }
     this.operations[region].push(operation);
     this.changed();
     return changed;
+  }
+
+  /** The samples that an operation is about. */
+  private chosen(operation: RegionOperation, members: readonly number[]): Set<number> {
+    const all = Array.from(this.marks.keys());
+    switch (operation.mode) {
+      case "clear":
+        return new Set();
+      case "invert": {
+        const inside = new Set(members);
+        return new Set(all.filter((i) => !inside.has(i)));
+      }
+      case "grow":
+      case "shrink": {
+        const inside = new Set(members);
+        const near = operation.mode === "grow" ? members : all.filter((i) => !inside.has(i));
+        const from = operation.mode === "grow" ? all : members;
+        return new Set(
+          from.filter((i) =>
+            near.some((j) => distance(this.position(i), this.position(j)) <= operation.distance),
+          ),
+        );
+      }
+      case "flood": {
+        const radius = operation.radius ?? Infinity;
+        return new Set(all.filter((i) => distance(this.position(i), operation.seed) <= radius));
+      }
+      default: {
+        const { facing, shape } = operation;
+        return new Set(
+          all.filter(
+            (i) => (!facing || dot(facing, this.normal(i)) > 0) && contains(shape, this.position(i)),
+          ),
+        );
+      }
+    }
+  }
+
+  /** A whole list instead of the one that there is. */
+  put(region: RegionName, operations: readonly RegionOperation[]): void {
+    this.clear(region);
+    for (const operation of operations) this.paint(region, operation);
   }
 
   clear(region: RegionName): void {
@@ -155,9 +207,18 @@ export class MockSession {
   }
 
   /** The whole surface with the committed edits and, on top, a preview. */
-  frame(preview: Deformation | null, sequence: number): Uint8Array<ArrayBuffer> {
+  frame(preview: Deformation | null, sequence: number, s = 1): Uint8Array<ArrayBuffer> {
     const deformations = this.edits.slice(0, this.head).map((record) => record.edit.deformation);
     if (preview) deformations.push(preview);
+    // The recorded edits one after the other, each over its own part of 0 … 1.
+    const part = s * deformations.length;
+    if (s < 1) deformations.length = Math.ceil(part);
+    const last = deformations.at(-1);
+    if (s < 1 && last?.type === "translation") {
+      const fraction = part - (deformations.length - 1);
+      const vector: Vec3 = [last.vector[0] * fraction, last.vector[1] * fraction, last.vector[2] * fraction];
+      deformations[deformations.length - 1] = { type: "translation", vector };
+    }
     const { count } = this.shape_;
     const sizes = layerSizes(count);
     const blocks: FrameBlock[] = [];
@@ -255,14 +316,62 @@ function slotOrder(shape: MockShape): Uint32Array {
 }
 
 function contains(shape: Shape, p: Vec3): boolean {
-  if (shape.type === "all") return true;
-  if (shape.type === "sphere") return distance(p, shape.center) <= shape.radius;
-  if (shape.type === "box")
-    return p.every((value, axis) => value >= (shape.min[axis] ?? 0) && value <= (shape.max[axis] ?? 0));
-  if (shape.type === "half_space") return dot(subtract(p, shape.point), shape.normal) >= 0;
-  return shape.vertices.some(
-    (vertex, i) => distanceToSegment(p, vertex, shape.vertices[i + 1] ?? vertex) <= shape.radius,
-  );
+  switch (shape.type) {
+    case "all":
+      return true;
+    case "sphere":
+      return distance(p, shape.center) <= shape.radius;
+    case "box":
+      return p.every((value, axis) => value >= (shape.min[axis] ?? 0) && value <= (shape.max[axis] ?? 0));
+    case "half_space":
+      return dot(subtract(p, shape.point), shape.normal) >= 0;
+    case "stroke":
+      return shape.vertices.some(
+        (vertex, i) => distanceToSegment(p, vertex, shape.vertices[i + 1] ?? vertex) <= shape.radius,
+      );
+    case "screen":
+      return isOutlined(shape, p);
+    case "image": {
+      if (shape.projection.type !== "planar") return false;
+      const { origin, u, v } = shape.projection;
+      const from = subtract(p, origin);
+      const [x, y] = [dot(from, u) / dot(u, u), dot(from, v) / dot(v, v)];
+      // Every image is a dark left half beside a bright right one.
+      return x >= 0 && x <= 1 && y >= 0 && y <= 1 && x > 0.5 === (shape.side === "above");
+    }
+    case "model":
+      return length(p) <= shape.thickness;
+  }
+}
+
+/** The projection and the tests of outlines as the contract has them. */
+function isOutlined({ view, outline }: ScreenShape, p: Vec3): boolean {
+  const row = (r: number): number =>
+    (view[4 * r] ?? 0) * p[0] +
+    (view[4 * r + 1] ?? 0) * p[1] +
+    (view[4 * r + 2] ?? 0) * p[2] +
+    (view[4 * r + 3] ?? 0);
+  const w = row(3);
+  if (w <= 0) return false;
+  const [x, y] = [row(0) / w, row(1) / w];
+  if (outline.type === "ellipse")
+    return (
+      ((x - outline.center[0]) / outline.half_axes[0]) ** 2 +
+        ((y - outline.center[1]) / outline.half_axes[1]) ** 2 <=
+      1
+    );
+  const at = (i: number): Vec3 => [...(outline.vertices[i] ?? [0, 0]), 0] as unknown as Vec3;
+  const count = outline.vertices.length;
+  if (outline.type === "polyline")
+    return outline.vertices.some(
+      (_, i) => distanceToSegment([x, y, 0], at(i), at(Math.min(i + 1, count - 1))) <= outline.width / 2,
+    );
+  let inside = false;
+  for (let i = 0; i < count; ++i) {
+    const [a, b] = [at(i), at((i + 1) % count)];
+    if (a[1] > y !== b[1] > y && x < a[0] + ((y - a[1]) / (b[1] - a[1])) * (b[0] - a[0])) inside = !inside;
+  }
+  return inside;
 }
 
 function octahedral(n: Vec3): [number, number] {

@@ -1,6 +1,13 @@
 import { expect, test } from "vitest";
-import type { Deformation } from "../../src/api/types";
-import { alongNormal, rotation, scaling, translation, twisting } from "../../src/edits/deformation";
+import type { ElementaryDeformation } from "../../src/api/types";
+import {
+  alongNormal,
+  rotation,
+  scaling,
+  towardPoint,
+  translation,
+  twisting,
+} from "../../src/edits/deformation";
 import type { TransformKind, TransformState } from "../../src/event-map";
 import { multiply, quaternionOf } from "../../src/math/quaternion";
 import { normalise, type Vec3 } from "../../src/math/vec3";
@@ -9,9 +16,11 @@ import { deformationOf, poseOf } from "../../src/tools/pose";
 const PIVOT: Vec3 = [1, 2, 3];
 const AXIS: Vec3 = [0.2, 0.9, -0.3];
 
-function stateOf(deformation: Deformation | null): TransformState {
+function stateOf(deformation: ElementaryDeformation | null): TransformState {
   return {
     deformation,
+    steps: [deformation],
+    step: 0,
     pivot: PIVOT,
     axis: null,
     pivotEditing: false,
@@ -23,12 +32,13 @@ function stateOf(deformation: Deformation | null): TransformState {
   };
 }
 
-const CASES: [TransformKind, Deformation][] = [
+const CASES: [TransformKind, ElementaryDeformation][] = [
   ["move", translation([0.5, -1, 0])],
   ["rotate", rotation(PIVOT, normalise(AXIS), 130)],
   ["scale", scaling(PIVOT, [2, 0.5, 1])],
   ["twist", twisting(PIVOT, AXIS, -75, 0.5)],
   ["normal", alongNormal(0.25)],
+  ["toward", towardPoint(PIVOT, 0.5)],
 ];
 
 function numbersOf(value: unknown): number[] {

@@ -29,6 +29,7 @@ uniform int residualKind;
 uniform vec3 residualVector;   // translation, unit axis, or factors less 1
 uniform vec3 residualPoint;
 uniform vec3 residualFrom;     // factors less 1 that the frame shows already
+uniform int residualBlend;     // what a quartic t is turned into: 0 nothing else, 1 cubic, 2 quintic, 3 cosine
 uniform float residualAmount;  // angle, angle a unit of height, or distance
 
 flat out vec3 vCenter;
@@ -44,6 +45,16 @@ vec3 decodeNormal(vec2 e) {
 vec3 turn(vec3 v, vec3 axis, float angle) {
   float c = cos(angle);
   return v * c + cross(axis, v) * sin(angle) + axis * dot(axis, v) * (1.0 - c);
+}
+
+// t as another blend makes it: quartic is (x^2 - 1)^2, which leads back to x.
+float reblend(float t) {
+  if (residualBlend == 0) return t;
+  float x = sqrt(max(0.0, 1.0 - sqrt(t)));
+  float y = 1.0 - x;
+  if (residualBlend == 1) return y * y * (1.0 + 2.0 * x);
+  if (residualBlend == 2) return y * y * y * (1.0 + 3.0 * x + 6.0 * x * x);
+  return 0.5 + 0.5 * cos(3.14159265358979 * x);
 }
 
 // F(p, t) of what the hand is ahead, and the cofactors of dF/dp on the normal. Answers how far samples move apart.
@@ -90,7 +101,7 @@ bool placeSplat(out vec3 normal) {
   if (float(lane) >= lower.w) return false;
   vec3 p = lower.xyz + texelFetch(blockTable, at + ivec2(1, 0), 0).xyz * position.xyz;
   normal = decodeNormal(octahedral);
-  float t = position.w;
+  float t = reblend(position.w);
   float spread = deformAhead(t, p, normal);
   vec4 center = viewMatrix * vec4(p, 1.0);
   vec3 n = mat3(viewMatrix) * normal;
