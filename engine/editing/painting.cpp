@@ -7,6 +7,7 @@
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
 #include "engine/editing/culled_shape.h"
+#include "engine/editing/model_cover.h"
 #include "engine/editing/selection.h"
 
 namespace pointwright {
@@ -24,12 +25,16 @@ Box3d model_box(const PaintSurface& surface, std::size_t begin, std::size_t end)
 // Which samples an operation's shape covers, block by block.
 class ShapeCover {
  public:
-  ShapeCover(const PaintOperation& operation, const PaintSurface& surface)
-      : surface_(surface), facing_(operation.facing), shape_(operation.shape) {}
+  ShapeCover(const PaintOperation& operation, const PaintSurface& surface, const ExecutionContext* context)
+      : surface_(surface), facing_(operation.facing), shape_(operation.shape) {
+    if (const auto* model = std::get_if<ModelShape>(&operation.shape))
+      model_.emplace(*model, surface.position, surface.origin, context);
+  }
 
   // Writes covered[0, end - begin). Stops early where cancelled.
   void cover(std::size_t begin, std::size_t end, std::uint8_t* covered,
              const ExecutionContext* context) const {
+    if (model_) return cover_by_model(begin, end, covered, context);
     std::vector<std::uint32_t> of_range;
     std::vector<std::uint32_t> of_block;
     const bool range_reached = shape_.may_cover(model_box(surface_, begin, end), of_range);
@@ -39,21 +44,37 @@ class ShapeCover {
       if (!range_reached || !shape_.may_cover(model_box(surface_, block, block_end), of_range, of_block))
         continue;
       for (std::size_t i = block; i < block_end; ++i)
-        covered[i - begin] = faces(i) && shape_.covers(place(i), of_block) ? 1 : 0;
+        covered[i - begin] = faces(i) && shape_.covers(place(i), texcoord(i), of_block) ? 1 : 0;
     }
   }
 
  private:
+  void cover_by_model(std::size_t begin, std::size_t end, std::uint8_t* covered,
+                      const ExecutionContext* context) const {
+    RegionDistances scratch;
+    for (std::size_t block = begin; block < end; block += kPaintBlock) {
+      if (context != nullptr && context->is_cancelled()) return;
+      const std::size_t block_end = std::min(block + kPaintBlock, end);
+      model_->cover(surface_.position, block, block_end, covered + (block - begin), scratch);
+      for (std::size_t i = block; i < block_end; ++i)
+        covered[i - begin] = covered[i - begin] != 0 && faces(i) ? 1 : 0;
+    }
+  }
   [[nodiscard]] bool faces(std::size_t i) const {
     return !facing_ || surface_.normal[i].cast<double>().dot(*facing_) > 0.0;
   }
   [[nodiscard]] Vec3d place(std::size_t i) const {
     return surface_.origin + surface_.position[i].cast<double>();
   }
+  [[nodiscard]] const TexCoord* texcoord(std::size_t i) const {
+    if (surface_.texcoord == nullptr || surface_.texcoord->empty()) return nullptr;
+    return &(*surface_.texcoord)[i];
+  }
 
   const PaintSurface& surface_;
   const std::optional<Vec3d>& facing_;
   CulledShape shape_;
+  std::optional<ModelCover> model_;
 };
 
 // What becomes of a sample, whether the operation covers it or not.
@@ -198,6 +219,11 @@ std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintS
   const std::size_t n = surface.position.size();
   POINTWRIGHT_CHECK(marks.size() == n, "one mark per sample");
   POINTWRIGHT_CHECK(!operation.facing || surface.normal.size() == n, "one normal per sample");
+  const bool has_shape_now = has_shape(operation.mode);
+  POINTWRIGHT_CHECK(!has_shape_now || has_its_data(operation.shape), "the image or model of the shape");
+  POINTWRIGHT_CHECK(!has_shape_now || !needs_texcoord(operation.shape) ||
+                        (surface.texcoord != nullptr && surface.texcoord->size() == n),
+                    "one texture coordinate per sample");
   const auto own = static_cast<std::uint8_t>(kind);
   const auto other =
       static_cast<std::uint8_t>(kind == RegionKind::kZero ? RegionKind::kOne : RegionKind::kZero);
@@ -211,7 +237,7 @@ std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintS
     chosen = flood_fill(surface, operation.flood, blocked, context);
   }
   std::optional<ShapeCover> shape;
-  if (has_shape(operation.mode)) shape.emplace(operation, surface);
+  if (has_shape_now) shape.emplace(operation, surface, context);
 
   return parallel_sum<std::size_t>(n, 0, [&](std::size_t begin, std::size_t end) {
     std::size_t changed = 0;

@@ -67,16 +67,18 @@ struct PaintSurface {
   const Points& position;  ///< relative to `origin`
   const Points& normal;    ///< read only for `facing` and for angles
   const Vec3d& origin;
-  const NeighborGraph* graph = nullptr;  ///< of its samples; read only for kFlood
+  const NeighborGraph* graph = nullptr;             ///< of its samples; read only for kFlood
+  const std::vector<TexCoord>* texcoord = nullptr;  ///< one a sample, or null or empty: none
 };
 
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
-/// Pre:         validate(operation)
+/// Pre:         validate(operation); its image or model was found; texture coordinates where it needs them
 /// Cost:        O(N), parallel over samples. A stroke or point set of V vertices adds O(V log V) to sort its
 ///              segments once, O(log V) for each range of kParallelBlock samples, and a test of each of a
 ///              block's 128 samples against the segments within the radius of that block. Long segments whose
 ///              bounding boxes hold all samples are each tested once a range; where all of them pass through
-///              all blocks it is O(N V). Growing and shrinking: near_members(),
+///              all blocks it is O(N V). A model of M samples: O(M) once, O(log M) a
+///              sample near it. Growing and shrinking: near_members(),
 ///              filling: flood_fill()
 /// Determinism: bitwise equal for any thread count
 /// Cancels:     between blocks of samples; the marks are then incomplete and must be dropped

@@ -107,10 +107,41 @@ void bench_region_query(BenchReport& report) {
   });
 }
 
+// A region from an image that lies across the scan, and one from another scan of the same size.
+void bench_outside_data(BenchReport& report) {
+  if (!report.wants("paint.image.2m") && !report.wants("paint.model.2m")) return;
+  const Cloud scan = ordered_scan(2'000'000);
+  const auto items = static_cast<double>(scan.size());
+  const PaintSurface surface{.position = scan.position, .normal = scan.normal, .origin = Vec3d::Zero()};
+  Image image{.width = 2048, .height = 2048, .channels = 4, .values = {}};
+  image.values.resize(value_bytes(image));
+  for (std::size_t i = 0; i < image.values.size(); ++i)
+    image.values[i] = static_cast<std::byte>(i % 4 == 3 ? 255 : (i >> 9U) & 255U);
+  const PaintOperation by_image{
+      .shape = ImageShape{.source = {},
+                          .image = std::make_shared<const Image>(std::move(image)),
+                          .projection = PlanarProjection{.origin = Vec3d(-1.5, -1.5, 0.0),
+                                                         .u = Vec3d(3.0, 0.0, 0.0),
+                                                         .v = Vec3d(0.0, 3.0, 0.0),
+                                                         .depth = std::nullopt}}};
+  report.time("paint.image.2m", "ms", items, [&] {
+    Marks marks(scan.size(), 0);
+    paint(by_image, RegionKind::kOne, surface, marks);
+  });
+  ModelShape model{.source = {}, .cloud = std::make_shared<const Cloud>(scan), .thickness = 0.01};
+  model.matrix[3] = 0.7;  // two rings, one through the other
+  const PaintOperation by_model{.shape = std::move(model)};
+  report.time("paint.model.2m", "ms", items, [&] {
+    Marks marks(scan.size(), 0);
+    paint(by_model, RegionKind::kOne, surface, marks);
+  });
+}
+
 }  // namespace
 
 void bench_editing(BenchReport& report) {
   bench_region_query(report);
+  bench_outside_data(report);
   for (const Size& size : {Size{"148k", 148'000}, Size{"437k", 437'645}, Size{"2m", 2'000'000}}) {
     bench_size(report, size);
   }

@@ -39,6 +39,15 @@ CloudDocument cloud() {
           .report = report()};
 }
 
+ImageDocument image() {
+  return {.id = "i7k8l9m0n1o2p-q_r3s4t5",
+          .width = 1024,
+          .height = 768,
+          .channels = {"red", "green", "blue", "alpha"},
+          .bytes = 48'213,
+          .created = created()};
+}
+
 SessionDocument building() {
   SessionDocument session;
   session.summary = {.id = kSessionId,
@@ -181,6 +190,8 @@ std::vector<File> document_files() {
   const std::vector<std::pair<std::string, JsonDocument>> documents{
       {"cloud", to_json(cloud())},
       {"cloud-list", cloud_list({cloud()})},
+      {"image", to_json(image())},
+      {"image-list", image_list({image()})},
       {"session-building", to_json(building())},
       {"session", to_json(ready())},
       {"session-failed", to_json(failed())},

@@ -22,7 +22,7 @@ export type SessionSummary = WithVectors<Schemas["SessionSummary"]>;
 export type PaintedSession = WithVectors<Schemas["PaintedSession"]>;
 
 /** The shapes that the viewer paints with. */
-export type Shape = WithVectors<Exclude<Schemas["Shape"], { type: "points" | "screen" }>>;
+export type Shape = WithVectors<Exclude<Schemas["Shape"], { type: "points" | "screen" | "image" | "model" }>>;
 /** What the server need not be told has its default. */
 export type RegionOperation = Omit<WithVectors<Schemas["ShapeOperation"]>, "shape" | "steal"> & {
   shape: Shape;
