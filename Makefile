@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build build-tests viewer sample demo serve test bench bench-peers sanitize tidy format check-arm64 clean
+.PHONY: help build build-tests viewer sample demo figures serve test bench bench-peers sanitize tidy format check-arm64 clean
 
 release := build/release
 daemon := $(release)/server/pointwrightd
@@ -64,6 +64,11 @@ demo: ## edit the Stanford dragon through the public HTTP API; pictures and resu
 	@.ci/setup build web view
 	@$(MAKE) --no-print-directory sample viewer
 	@node web/demo/demo.mjs
+
+figures: ## two figures of the paper through the public HTTP API, as pictures in build/figures
+	@.ci/setup build web view
+	@$(MAKE) --no-print-directory build viewer
+	@node web/demo/figures.mjs
 
 serve: ## run the editor on http://$(HOST):$(PORT) until Ctrl-C
 	@.ci/setup build web

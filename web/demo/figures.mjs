@@ -1,0 +1,162 @@
+// Two figures of the paper, made through the public HTTP API and the real viewer: the elementary deformations of Figure 5, and
+// the embossed plate of Figure 10 that is bent on one resolution and on several. `make figures` builds what it needs and runs it.
+import { mkdirSync, rmSync } from "node:fs";
+import { resolve } from "node:path";
+import { launchBrowser } from "../scripts/browser.mjs";
+import { call, here, openSession, root, step, takePicture, upload } from "./api.mjs";
+import { putTogether } from "./beside.mjs";
+import { startDaemon } from "./daemon.mjs";
+import { checkerboard, plate } from "./plate.mjs";
+
+const out = resolve(root, "build/figures");
+const side = 352;
+const ply = "application/x-ply";
+const size = "1000x800";
+const aspect = 1000 / 800;
+
+const put = (url, session, region, operations) =>
+  call(url, "PUT", `${session.path}/regions/${region}`, { json: { operations } });
+async function commit(url, session, json) {
+  const { revision } = await (await call(url, "GET", session.path)).json();
+  return call(url, "POST", `${session.path}/edits`, { json, headers: { "If-Match": `"r${revision}"` } });
+}
+const undoAll = (url, session) => call(url, "PUT", `${session.path}/head`, { json: { edit: 0 } });
+
+const add = (shape) => ({ mode: "add", shape });
+const beyondCircle = [add({ type: "sphere", center: [0, 0, 0], radius: 0.85 }), { mode: "invert" }];
+const beyondSquare = [
+  add({ type: "box", min: [-0.85, -0.85, -1], max: [0.85, 0.85, 1] }),
+  { mode: "invert" },
+];
+
+/** Two edits: what stays, what moves, and how. */
+const examples = [
+  {
+    name: "disc",
+    zero: beyondCircle,
+    one: [add({ type: "sphere", center: [0, 0, 0], radius: 0.3 })],
+    deformation: { type: "translation", vector: [0, 0, 0.7] },
+  },
+  {
+    name: "bar",
+    zero: beyondSquare,
+    one: [
+      add({
+        type: "stroke",
+        vertices: [
+          [-0.4, 0, 0],
+          [0.4, 0, 0],
+        ],
+        radius: 0.12,
+      }),
+    ],
+    deformation: { type: "rotation", axis: { point: [0, 0, 0], direction: [0, -1, 0] }, angle_deg: 60 },
+  },
+];
+
+async function elementaryDeformations(url) {
+  const camera = { position: [0.5, -2.5, 1.9], target: [0, -0.05, 0.1], up: [0, 0, 1] };
+  const cloud = await upload(url, "Plate", ply, plate(side, { colour: checkerboard(16) }));
+  const session = await openSession(url, { cloud: cloud.id, name: "Figure 5", scales: [0.01] });
+  const rows = [];
+  for (const { name, zero, one, deformation } of examples) {
+    await put(url, session, "zero", zero);
+    await put(url, session, "one", one);
+    const file = (mode) => resolve(out, `${name}-${mode}.png`);
+    const picture = (mode) => takePicture(url, session.id, file(mode), { camera, mode, size });
+    await picture("regions");
+    await picture("t");
+    await commit(url, session, { level: 0, deformation });
+    for (const region of ["zero", "one"]) await put(url, session, region, []); // their tint would hide the colours
+    await picture("color");
+    await undoAll(url, session);
+    rows.push(["regions", "t", "color"].map(file));
+  }
+  const figure = resolve(out, "figure-5.jpg");
+  await putTogether(rows, aspect, figure);
+  return here(figure);
+}
+
+/** The name as white letters on black, as a PNG. */
+async function lettering() {
+  const browser = await launchBrowser();
+  try {
+    const page = await browser.newPage({ viewport: { width: 1024, height: 1024 } });
+    await page.setContent(
+      '<body style="margin:0;background:#000;color:#fff;display:grid;place-items:center;height:100vh;text-align:center;' +
+        'font:bold 230px/1.05 sans-serif"><div>Point<br>wright</div></body>',
+    );
+    return await page.screenshot({ type: "png" });
+  } finally {
+    await browser.close();
+  }
+}
+
+/** Bright pixels move up, dark ones stay: the letters are embossed by a translation. Then the plate is bent. */
+async function embossedPlate(url) {
+  const cloud = await upload(url, "Embossed plate", ply, plate(side));
+  const session = await openSession(url, { cloud: cloud.id, name: "Figure 10", scales: [0.06] });
+  const headers = { "Content-Type": "image/png" };
+  const image = await (await call(url, "POST", "/v1/images", { body: await lettering(), headers })).json();
+  const letters = (threshold, side) => ({
+    mode: "add",
+    shape: {
+      type: "image",
+      image: image.id,
+      threshold,
+      side,
+      projection: { type: "texture", repeat: false },
+    },
+  });
+  await put(url, session, "zero", [letters(0.2, "below")]);
+  await put(url, session, "one", [letters(0.8, "above")]);
+  const above = { position: [0.2, -1.9, 2.5], target: [0, 0, 0], up: [0, 0, 1] };
+  const file = (name) => resolve(out, `${name}.png`);
+  await takePicture(url, session.id, file("letters"), { camera: above, mode: "regions", size });
+  const finest = session.levels.length - 1;
+  await commit(url, session, { level: finest, deformation: { type: "translation", vector: [0, 0, 0.05] } });
+  await takePicture(url, session.id, file("embossed"), { camera: above, mode: "shaded", size });
+
+  const half = (sign, x) => ({
+    mode: "add",
+    shape: { type: "half_space", point: [sign * x, 0, 0], normal: [sign, 0, 0] },
+  });
+  await put(url, session, "zero", [half(-1, 0.9)]);
+  await put(url, session, "one", [half(1, 0.9)]);
+  const bend = { type: "rotation", axis: { point: [0, 0, 1.1], direction: [0, -1, 0] }, angle_deg: 95 };
+  const beside = { position: [2.1, -1.1, 1.9], target: [0.25, 0, 0.35], up: [0, 0, 1] };
+  for (const [name, level] of [
+    ["single-resolution", finest],
+    ["multiresolution", 0],
+  ]) {
+    await commit(url, session, { level, deformation: bend });
+    await takePicture(url, session.id, file(name), { camera: beside, mode: "shaded", size });
+    await call(url, "PUT", `${session.path}/head`, { json: { edit: 1 } });
+  }
+  const figure = resolve(out, "figure-10.jpg");
+  const rows = [
+    ["letters", "embossed"],
+    ["single-resolution", "multiresolution"],
+  ];
+  await putTogether(
+    rows.map((row) => row.map(file)),
+    aspect,
+    figure,
+  );
+  return here(figure);
+}
+
+rmSync(out, { recursive: true, force: true });
+mkdirSync(out, { recursive: true });
+const daemon = await startDaemon(["--web", resolve(root, "web/dist")]);
+for (const signal of ["SIGINT", "SIGTERM"])
+  process.once(signal, () => daemon.stop().then(() => process.exit(130)));
+try {
+  await step("Figure 5", () => elementaryDeformations(daemon.url));
+  await step("Figure 10", () => embossedPlate(daemon.url));
+} catch (error) {
+  console.error(`figures: ${error.message}\n${daemon.log().split("\n").slice(-10).join("\n")}`);
+  process.exitCode = 1;
+}
+const status = await daemon.stop();
+if (status !== 0) process.exitCode = 1;
