@@ -199,12 +199,6 @@ bool has_its_data(const Shape& shape) {
   return true;
 }
 
-Shape without_data(Shape shape) {
-  if (auto* image = std::get_if<ImageShape>(&shape)) image->image.reset();
-  if (auto* model = std::get_if<ModelShape>(&shape)) model->cloud.reset();
-  return shape;
-}
-
 bool needs_texcoord(const Shape& shape) {
   const auto* image = std::get_if<ImageShape>(&shape);
   return image != nullptr && std::holds_alternative<TextureProjection>(image->projection);

@@ -63,12 +63,11 @@ bool contains(const Shape& shape, const Vec3d& point, const TexCoord* texcoord =
 
 /// Whether the image or the model that the shape names is there; true for all other shapes.
 bool has_its_data(const Shape& shape);
-/// The shape as it is recorded: an image or a model by its name alone.
-Shape without_data(Shape shape);
 /// Whether the shape reads the texture coordinates of samples.
 bool needs_texcoord(const Shape& shape);
 
-/// Whether the shape is a choice among samples, not a volume: see PaintOperation's depends_on_sampling().
+/// Whether the shape is no volume that its members alone describe: a choice among samples, or a name of data
+/// that may be gone tomorrow. See PaintOperation's depends_on_sampling().
 bool depends_on_sampling(const Shape& shape);
 
 /// Vertices that the shape counts with against the limit of a painting: those of strokes, point sets and

@@ -60,10 +60,11 @@ class Session : public std::enable_shared_from_this<Session> {
   };
   /// The revision that a change was made for; none: any. Its problem: stale revision.
   using Expected = std::optional<std::uint64_t>;
-  /// Appends one operation to a region's painting. Problems: wrong state, too many operations or vertices.
+  /// Paints one operation and appends it to the region's painting as it is recorded: resolved(). Problems:
+  /// wrong state, too many operations or vertices.
   Outcome<Painted> paint(RegionKind kind, const PaintOperation& operation, Expected expected = {});
   /// Replaces a region's whole painting; none: clears it.
-  Outcome<Painted> replace_painting(RegionKind kind, std::vector<PaintOperation> operations,
+  Outcome<Painted> replace_painting(RegionKind kind, const std::vector<PaintOperation>& operations,
                                     Expected expected = {});
 
   /// Asks for a preview to be shown. Returns once it is known to be possible; it is computed afterwards,
@@ -132,7 +133,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<SharedField> ensure_field(std::uint32_t level, Blend blend);
   Outcome<Done> ensure_level(std::uint32_t level);
   Outcome<SurfaceState> compute(const EditParams& params);
-  Outcome<Painted> repaint(RegionKind kind, std::vector<PaintOperation> operations, bool append,
+  Outcome<Painted> repaint(RegionKind kind, const std::vector<PaintOperation>& operations, bool append,
                            Expected expected);
   [[nodiscard]] std::optional<Outcome<Done>> known_verdict(const Document& document,
                                                            const EditParams& params) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/core/moved_cloud.h"
+#include "engine/editing/resolved_painting.h"
 #include "server/sessions/session.h"
 
 namespace pointwright::server {
@@ -18,10 +19,19 @@ protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) 
   return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
 }
 
-std::size_t vertices_of(const std::vector<PaintOperation>& operations) {
-  std::size_t count = 0;
-  for (const PaintOperation& operation : operations) count += vertex_count(operation.shape);
-  return count;
+// Whether a region may have as many operations, with as many vertices in all.
+Outcome<Done> check_painting(const SessionParams& params, std::size_t operations, std::size_t vertices) {
+  if (operations > params.max_operations)
+    return Problem{.kind = ProblemKind::kTooMany,
+                   .detail = "the region has as many operations as a painting may have",
+                   .limit = static_cast<double>(params.max_operations),
+                   .actual = static_cast<double>(operations)};
+  if (vertices > params.max_painting_vertices)
+    return Problem{.kind = ProblemKind::kTooManySamples,
+                   .detail = "the shapes of the region have more vertices than a painting may have",
+                   .limit = static_cast<double>(params.max_painting_vertices),
+                   .actual = static_cast<double>(vertices)};
+  return Done{};
 }
 
 }  // namespace
@@ -33,14 +43,15 @@ Outcome<Session::Painted> Session::paint(RegionKind kind, const PaintOperation& 
   return on_strand([&, this] { return repaint(kind, {operation}, true, expected); });
 }
 
-Outcome<Session::Painted> Session::replace_painting(RegionKind kind, std::vector<PaintOperation> operations,
+Outcome<Session::Painted> Session::replace_painting(RegionKind kind,
+                                                    const std::vector<PaintOperation>& operations,
                                                     Expected expected) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
-  return on_strand([&, this] { return repaint(kind, std::move(operations), false, expected); });
+  return on_strand([&, this] { return repaint(kind, operations, false, expected); });
 }
 
-Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOperation> operations,
+Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<PaintOperation>& operations,
                                            bool append, Expected expected) {
   if (auto open = check_open(); !open.ok()) return open.problem();
   if (auto current = check_revision(expected); !current.ok()) return current.problem();
@@ -50,18 +61,9 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
   drag_.reset();
   const SharedDocument before = document();
   const Painting& painting = before->painting(kind);
-  const std::size_t kept = append ? painting.operations->size() : 0;
-  if (kept + operations.size() > params_.max_operations)
-    return Problem{.kind = ProblemKind::kTooMany,
-                   .detail = "the region has as many operations as a painting may have",
-                   .limit = static_cast<double>(params_.max_operations),
-                   .actual = static_cast<double>(kept + operations.size())};
-  const std::size_t vertices = (append ? painting.vertices : 0) + vertices_of(operations);
-  if (vertices > params_.max_painting_vertices)
-    return Problem{.kind = ProblemKind::kTooManySamples,
-                   .detail = "the shapes of the region have more vertices than a painting may have",
-                   .limit = static_cast<double>(params_.max_painting_vertices),
-                   .actual = static_cast<double>(vertices)};
+  auto list = std::make_shared<OperationList>();
+  if (append) *list = *painting.operations;
+  std::size_t vertices = append ? painting.vertices : 0;
   auto marks = std::make_shared<Marks>(*before->marks);
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
@@ -72,20 +74,23 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
                              .graph = rest_.graph.get(),
                              .texcoord = &params_.cloud->texcoord};
   for (const PaintOperation& operation : operations) {
-    pointwright::paint(operation, kind, surface, *marks, &context_);
+    // What is recorded is what is painted: the list gives these marks again, here and on another sampling.
+    std::vector<PaintOperation> recorded = resolved(operation, kind, surface, *marks, &context_);
     if (auto open = check_open(); !open.ok()) return open.problem();
+    for (const PaintOperation& each : recorded) vertices += vertex_count(each.shape);
+    if (auto fits = check_painting(params_, list->size() + recorded.size(), vertices); !fits.ok())
+      return fits.problem();
+    for (PaintOperation& each : recorded) {
+      pointwright::paint(each, kind, surface, *marks, &context_);
+      if (auto open = check_open(); !open.ok()) return open.problem();
+      list->push_back(std::make_shared<const PaintOperation>(std::move(each)));
+    }
   }
   Painted result;
   for (std::size_t i = 0; i < marks->size(); ++i)
     if ((*marks)[i] != (*before->marks)[i]) ++result.changed;
 
   Document after = *before;
-  auto list = std::make_shared<OperationList>();
-  if (append) *list = *painting.operations;
-  for (PaintOperation& operation : operations) {
-    operation.shape = without_data(std::move(operation.shape));
-    list->push_back(std::make_shared<const PaintOperation>(std::move(operation)));
-  }
   Painting& painted = kind == RegionKind::kZero ? after.zero : after.one;
   painted.operations = std::move(list);
   painted.vertices = vertices;

@@ -246,7 +246,7 @@ TEST_CASE("images are refused with the member that is wrong") {
   CHECK_FALSE(needs_texcoord(shape));
   CHECK(needs_texcoord(on_texture(nullptr, true)));
   CHECK(has_its_data(shape));
-  CHECK_FALSE(has_its_data(without_data(shape)));
+  CHECK_FALSE(has_its_data(ImageShape{}));
   for (const double threshold : {-0.001, 1.001}) {
     shape.threshold = threshold;
     check_refused(shape, ErrorCode::kOutOfRange, "shape.threshold");

@@ -320,6 +320,25 @@ TEST_CASE("regions are painted, read, replaced and cleared") {
   CHECK(test.get(path + "/regions/middle").status == 404);
 }
 
+TEST_CASE("a flood is read back as the balls that it filled, and they paint the same") {
+  TestService test;
+  const std::string zero = test.open_session() + "/regions/zero";
+  const Answer flooded = test.ask(Method::kPost, zero + "/operations",
+                                  R"({"mode":"flood","seed":[0.5,0.5,0],"radius":0.3,"steal":true})");
+  REQUIRE(flooded.status == 200);
+  CHECK(flooded.body["changed"] > 100);
+  const Answer region = test.get(zero);
+  REQUIRE(region.body["operations"].size() == 1);
+  const json& recorded = region.body["operations"][0];
+  CHECK(recorded["mode"] == "add");
+  CHECK(recorded["steal"] == true);
+  CHECK(recorded["shape"]["type"] == "points");
+  CHECK(recorded["shape"]["radii"].size() < flooded.body["changed"]);
+  const Answer put = test.ask(Method::kPut, zero, json{{"operations", region.body["operations"]}}.dump());
+  CHECK(put.status == 200);
+  CHECK(put.body["changed"] == 0);
+}
+
 TEST_CASE("an edit owes the current revision") {
   TestService test;
   const std::string path = test.open_painted();

@@ -6,6 +6,8 @@
 #include <thread>
 
 #include "protocol/frames/frame.h"
+#include "protocol/json/parse.h"
+#include "protocol/json/requests.h"
 #include "tests/server/synthetic.h"
 
 using namespace pointwright;
@@ -31,6 +33,7 @@ struct Workshop {
   ComputePool interactive;
   ComputePool background;
   std::shared_ptr<const Cloud> cloud = std::make_shared<const Cloud>(wavy_sheet(40));
+  std::size_t max_painting_vertices = 1'000'000;
 
   std::shared_ptr<Session> open(std::uint64_t history_bytes = 1ULL << 30U,
                                 HierarchyBuilder build = build_hierarchy) {
@@ -41,7 +44,8 @@ struct Workshop {
                             .hierarchy = {.scales = {0.05F}},
                             .history_bytes = history_bytes,
                             .max_edits = 50,
-                            .max_operations = 5},
+                            .max_operations = 5,
+                            .max_painting_vertices = max_painting_vertices},
                            {.interactive = interactive, .background = background, .build = std::move(build)});
   }
   std::shared_ptr<Session> ready(std::uint64_t history_bytes = 1ULL << 30U) {
@@ -168,6 +172,78 @@ TEST_CASE("painting counts what changed and raises the revision") {
   const auto cleared = session->replace_painting(RegionKind::kZero, {});
   CHECK(cleared.value().document->zero.samples == 0);
   CHECK(cleared.value().document->revision == 4);
+}
+
+// The list as a client reads it and sends it back.
+std::vector<PaintOperation> read_back(const Painting& painting) {
+  std::string list;
+  for (const auto& operation : *painting.operations) {
+    CHECK_FALSE(depends_on_sampling(*operation));
+    list += (list.empty() ? "" : ",") + protocol::to_json(*operation).dump();
+  }
+  const auto document = protocol::parse_json(R"({"operations":[)" + list + "]}");
+  REQUIRE(document.ok());
+  auto parsed = protocol::parse_painting(document.value());
+  REQUIRE(parsed.ok());
+  return std::move(parsed).value();
+}
+
+TEST_CASE("a painting that was made by operations on samples gives the same marks when it is put back") {
+  Workshop workshop;
+  ScreenShape seen{.outline = ScreenEllipse{.center = {0.5, 0.5}, .half_axes = {0.2, 0.4}}, .visible = true};
+  const PaintOperation flood{.mode = PaintMode::kFlood,
+                             .steal = true,
+                             .flood = {.seed = Vec3d(0.5, 0.5, 0.0), .radius = 0.3, .stop_at_other = true}};
+  const std::vector<PaintOperation> operations = {
+      {.shape = AxisBox{.min = Vec3d(0.4, 0.0, -1.0), .max = Vec3d(0.9, 1.0, 1.0)},
+       .facing = Vec3d(0.6, 0.0, 0.8)},
+      flood,
+      {.mode = PaintMode::kGrow, .distance = 0.07},
+      {.mode = PaintMode::kRemove, .shape = seen}};
+  // As it was built, and once an edit moved it: the list holds the places of then.
+  for (const bool edited : {false, true}) {
+    const auto made = workshop.painted();
+    const auto second = workshop.painted();
+    if (edited) {
+      commit(*made, lift(0.3));
+      commit(*second, lift(0.3));
+    }
+    for (const PaintOperation& operation : operations) {
+      const auto painted = made->paint(RegionKind::kZero, operation);
+      REQUIRE(painted.ok());
+      CHECK(painted.value().changed > 0);
+    }
+    const auto list = read_back(made->document()->zero);
+    CHECK(list.size() == operations.size() + 1);
+    // The one-region lost what the flood stole; its own list does not know.
+    REQUIRE(second->replace_painting(RegionKind::kZero, list).ok());
+    CHECK(*second->document()->marks == *made->document()->marks);
+    // Once more, into the session itself.
+    const auto again = made->replace_painting(RegionKind::kZero, list);
+    REQUIRE(again.ok());
+    CHECK(again.value().changed == 0);
+  }
+  // Painted before an edit, put into a session that was never edited.
+  const auto made = workshop.painted();
+  for (const PaintOperation& operation : operations) REQUIRE(made->paint(RegionKind::kZero, operation).ok());
+  commit(*made, lift(0.3));
+  const auto fresh = workshop.painted();
+  REQUIRE(fresh->replace_painting(RegionKind::kZero, read_back(made->document()->zero)).ok());
+  CHECK(*fresh->document()->marks == *made->document()->marks);
+}
+
+TEST_CASE("what an operation on samples is recorded as counts against the limits of a painting") {
+  Workshop workshop;
+  workshop.max_painting_vertices = 20;
+  const auto session = workshop.ready();
+  const PaintOperation flood{.mode = PaintMode::kFlood,
+                             .flood = {.seed = Vec3d(0.5, 0.5, 0.0), .radius = 0.3}};
+  const auto refused = session->paint(RegionKind::kZero, flood);
+  CHECK(kind_of(refused) == ProblemKind::kTooManySamples);
+  CHECK(refused.problem().limit == 20.0);
+  CHECK(refused.problem().actual.value_or(0.0) > 20.0);
+  CHECK(session->document()->zero.samples == 0);
+  CHECK(session->document()->revision == 0);
 }
 
 TEST_CASE("a region takes no more operations than the limit says") {
