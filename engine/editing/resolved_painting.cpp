@@ -32,8 +32,12 @@ class Resolver {
   // The samples of the mask join or leave.
   [[nodiscard]] Operations each(PaintMode mode, const SampleMask& mask) const {
     Operations operations;
-    for (PointSet& set : ball_cover(surface_.position, mask, surface_.origin, context_))
-      operations.push_back({.mode = mode, .shape = std::move(set), .steal = steal_});
+    for (PointSet& set : ball_cover(surface_.position, mask, surface_.origin, context_)) {
+      PaintOperation& operation = operations.emplace_back();
+      operation.mode = mode;
+      operation.shape.emplace<PointSet>(std::move(set));
+      operation.steal = steal_;
+    }
     return operations;
   }
 

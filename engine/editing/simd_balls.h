@@ -28,9 +28,9 @@ POINTWRIGHT_SIMD_INLINE F gap(const float* lower, const float* upper, float low,
   return max(max(load(lower) - high, low - load(upper)), F{});
 }
 
-// A ball a near the middle of a box. It beats a ball b at a point p where |p - b| - |p - a| > more, the radius
-// of b less its own; that is |p - b|^2 - |p - a|^2 > more (2 |p - a| + more). The left side is a sum over axes,
-// each of them least at an end of the box.
+// A ball a near the middle of a box. It beats a ball b at a point p where |p - b| - |p - a| > more, the
+// radius of b less its own; that is |p - b|^2 - |p - a|^2 > more (2 |p - a| + more). The left side is a sum
+// over axes, each of them least at an end of the box.
 struct Rival {
   float center[3];
   float radius;

@@ -11,6 +11,7 @@
 #include "server/ingest/sandbox.h"
 #include "tests/acceptance/cloud_files.h"
 #include "tests/acceptance/daemon.h"
+#include "tests/acceptance/stream_reader.h"
 #include "tests/server/raw_client.h"
 #include "tests/server/synthetic.h"
 
@@ -28,63 +29,6 @@ std::string translation(double z, const std::string& more = "") {
          std::to_string(z) + "]}" + more + "}";
 }
 
-/// Reads a stream's records from a connection.
-class StreamReader {
- public:
-  StreamReader(const Daemon& daemon, const std::string& target) : client_(daemon.port()) {
-    client_.send("GET " + target + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
-  }
-  /// The next record within a while; nullopt at the end.
-  std::optional<protocol::StreamRecord> next() {
-    while (true) {
-      auto record = parser_.next();
-      REQUIRE(record.ok());
-      if (record.value()) return record.value();
-      if (!client_.receive_some(raw_, std::chrono::seconds(20))) return std::nullopt;
-      take_chunks();
-    }
-  }
-  /// The next frame, past events.
-  std::optional<protocol::DecodedFrame> next_frame() {
-    while (auto record = next()) {
-      if (record->type != 1) continue;
-      auto frame = protocol::decode_frame(record->payload);
-      REQUIRE(frame.ok());
-      return std::move(frame).value();
-    }
-    return std::nullopt;
-  }
-  static json event(const protocol::StreamRecord& record) {
-    const auto* begin = reinterpret_cast<const char*>(record.payload.data());
-    return json::parse(begin, begin + record.payload.size());
-  }
-  void close() { client_.close(); }
-  RawClient& client() { return client_; }
-
- private:
-  void take_chunks() {
-    if (!past_head_) {
-      const std::size_t end = raw_.find("\r\n\r\n");
-      if (end == std::string::npos) return;
-      CHECK(status_of(raw_) == 200);
-      raw_.erase(0, end + 4);
-      past_head_ = true;
-    }
-    while (true) {
-      const std::size_t end = raw_.find("\r\n");
-      if (end == std::string::npos) return;
-      const std::size_t size = std::stoul(raw_.substr(0, end), nullptr, 16);
-      if (raw_.size() < end + 2 + size + 2) return;
-      parser_.push(std::as_bytes(std::span(raw_.data() + end + 2, size)));
-      raw_.erase(0, end + 2 + size + 2);
-    }
-  }
-
-  RawClient client_;
-  protocol::StreamRecordParser parser_;
-  std::string raw_;
-  bool past_head_ = false;
-};
 
 }  // namespace
 

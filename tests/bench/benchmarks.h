@@ -12,5 +12,7 @@ void bench_smoothing(BenchReport& report);
 void bench_editing(BenchReport& report);
 void bench_frames(BenchReport& report);
 void bench_session(BenchReport& report);
+/// Only where the daemon is built.
+void bench_http(BenchReport& report);
 
 }  // namespace pointwright::bench

@@ -32,6 +32,9 @@ int main(int argc, char** argv) {
     pointwright::bench::bench_editing(report);
     pointwright::bench::bench_frames(report);
     pointwright::bench::bench_session(report);
+#ifdef POINTWRIGHT_BENCH_HTTP
+    pointwright::bench::bench_http(report);
+#endif
   });
   if (!report.write_json(out)) {
     std::fprintf(stderr, "cannot write %s\n", out.c_str());
