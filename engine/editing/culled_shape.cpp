@@ -124,6 +124,7 @@ CulledShape::CulledShape(const Shape& shape) : shape_(&shape) {
   if (const auto* stroke = std::get_if<Stroke>(&shape)) tree_.emplace(*stroke);
   if (const auto* points = std::get_if<PointSet>(&shape)) tree_.emplace(*points);
   if (const auto* screen = std::get_if<ScreenShape>(&shape)) outline_.emplace(*screen);
+  if (const auto* image = std::get_if<ImageShape>(&shape)) image_.emplace(*image);
 }
 
 bool CulledShape::may_cover(const Box3d& box, std::vector<std::uint32_t>& capsules) const {
@@ -141,7 +142,9 @@ bool CulledShape::may_cover(const Box3d& box, const std::vector<std::uint32_t>& 
   return !capsules.empty();
 }
 
-bool CulledShape::covers(const Vec3d& point, const std::vector<std::uint32_t>& capsules) const {
+bool CulledShape::covers(const Vec3d& point, const TexCoord* texcoord,
+                         const std::vector<std::uint32_t>& capsules) const {
+  if (image_) return image_->covers(point, texcoord);
   if (outline_) {
     const std::optional<Vec2d> place = project(std::get<ScreenShape>(*shape_), point);
     return place && outline_->contains(*place);
@@ -158,6 +161,7 @@ bool CulledShape::may_cover(const Box3d& box) const {
   if (const auto* axis_box = std::get_if<AxisBox>(shape_)) {
     return overlap(box, {axis_box->min, axis_box->max});
   }
+  if (image_) return image_->may_cover(0.5 * (box.min + box.max), 0.5 * (box.max - box.min));
   return true;
 }
 

@@ -70,8 +70,9 @@ class CulledShape {
   /// The same for a box inside one whose answer was `from`.
   bool may_cover(const Box3d& box, const std::vector<std::uint32_t>& from,
                  std::vector<std::uint32_t>& capsules) const;
-  /// contains(shape, point) for a point of the box whose answer was `capsules`.
-  [[nodiscard]] bool covers(const Vec3d& point, const std::vector<std::uint32_t>& capsules) const;
+  /// contains(shape, point, texcoord) for a point of the box whose answer was `capsules`.
+  [[nodiscard]] bool covers(const Vec3d& point, const TexCoord* texcoord,
+                            const std::vector<std::uint32_t>& capsules) const;
 
  private:
   [[nodiscard]] bool may_cover(const Box3d& box) const;
@@ -79,6 +80,7 @@ class CulledShape {
   const Shape* shape_;
   std::optional<CapsuleTree> tree_;
   std::optional<BandedOutline> outline_;
+  std::optional<ImageCover> image_;
 };
 
 }  // namespace pointwright

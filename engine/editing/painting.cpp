@@ -7,10 +7,19 @@
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
 #include "engine/editing/culled_shape.h"
+#include "engine/editing/model_cover.h"
 #include "engine/editing/selection.h"
+#include "engine/editing/visibility.h"
 
 namespace pointwright {
 namespace {
+
+std::uint8_t bit_of(RegionKind kind) {
+  return static_cast<std::uint8_t>(kind);
+}
+std::uint8_t other_bit(RegionKind kind) {
+  return bit_of(kind == RegionKind::kZero ? RegionKind::kOne : RegionKind::kZero);
+}
 
 // Samples that share one culling decision.
 constexpr std::size_t kPaintBlock = 128;
@@ -24,12 +33,16 @@ Box3d model_box(const PaintSurface& surface, std::size_t begin, std::size_t end)
 // Which samples an operation's shape covers, block by block.
 class ShapeCover {
  public:
-  ShapeCover(const PaintOperation& operation, const PaintSurface& surface)
-      : surface_(surface), facing_(operation.facing), shape_(operation.shape) {}
+  ShapeCover(const PaintOperation& operation, const PaintSurface& surface, const ExecutionContext* context)
+      : surface_(surface), facing_(operation.facing), shape_(operation.shape) {
+    if (const auto* model = std::get_if<ModelShape>(&operation.shape))
+      model_.emplace(*model, surface.position, surface.origin, context);
+  }
 
   // Writes covered[0, end - begin). Stops early where cancelled.
   void cover(std::size_t begin, std::size_t end, std::uint8_t* covered,
              const ExecutionContext* context) const {
+    if (model_) return cover_by_model(begin, end, covered, context);
     std::vector<std::uint32_t> of_range;
     std::vector<std::uint32_t> of_block;
     const bool range_reached = shape_.may_cover(model_box(surface_, begin, end), of_range);
@@ -39,21 +52,36 @@ class ShapeCover {
       if (!range_reached || !shape_.may_cover(model_box(surface_, block, block_end), of_range, of_block))
         continue;
       for (std::size_t i = block; i < block_end; ++i)
-        covered[i - begin] = faces(i) && shape_.covers(place(i), of_block) ? 1 : 0;
+        covered[i - begin] = faces(i) && shape_.covers(place(i), texcoord(i), of_block) ? 1 : 0;
     }
   }
 
  private:
+  void cover_by_model(std::size_t begin, std::size_t end, std::uint8_t* covered,
+                      const ExecutionContext* context) const {
+    RegionDistances scratch;
+    for (std::size_t block = begin; block < end; block += kPaintBlock) {
+      if (context != nullptr && context->is_cancelled()) return;
+      const std::size_t block_end = std::min(block + kPaintBlock, end);
+      model_->cover(surface_.position, block, block_end, covered + (block - begin), scratch);
+      for (std::size_t i = block; i < block_end; ++i)
+        covered[i - begin] = covered[i - begin] != 0 && faces(i) ? 1 : 0;
+    }
+  }
   [[nodiscard]] bool faces(std::size_t i) const {
     return !facing_ || surface_.normal[i].cast<double>().dot(*facing_) > 0.0;
   }
   [[nodiscard]] Vec3d place(std::size_t i) const {
     return surface_.origin + surface_.position[i].cast<double>();
   }
+  [[nodiscard]] const TexCoord* texcoord(std::size_t i) const {
+    return surface_.texcoord == nullptr ? nullptr : &(*surface_.texcoord)[i];
+  }
 
   const PaintSurface& surface_;
   const std::optional<Vec3d>& facing_;
   CulledShape shape_;
+  std::optional<ModelCover> model_;
 };
 
 // What becomes of a sample, whether the operation covers it or not.
@@ -193,36 +221,55 @@ Result<void> validate(const PaintOperation& operation) {
   return check_facing(operation);
 }
 
-std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface, Marks& marks,
-                  const ExecutionContext* context) {
+bool depends_on_sampling(const PaintOperation& operation) {
+  if (has_shape(operation.mode)) return operation.facing || depends_on_sampling(operation.shape);
+  return has_distance(operation.mode) || operation.mode == PaintMode::kFlood;
+}
+
+SampleMask covered_samples(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface,
+                           const Marks& marks, const ExecutionContext* context) {
   const std::size_t n = surface.position.size();
   POINTWRIGHT_CHECK(marks.size() == n, "one mark per sample");
-  POINTWRIGHT_CHECK(!operation.facing || surface.normal.size() == n, "one normal per sample");
-  const auto own = static_cast<std::uint8_t>(kind);
-  const auto other =
-      static_cast<std::uint8_t>(kind == RegionKind::kZero ? RegionKind::kOne : RegionKind::kZero);
-  const Changes changes = changes_of(operation.mode);
-  SampleMask chosen;
-  if (has_distance(operation.mode)) chosen = at_border(operation, own, surface.position, marks, context);
+  if (has_distance(operation.mode))
+    return at_border(operation, bit_of(kind), surface.position, marks, context);
   if (operation.mode == PaintMode::kFlood) {
     POINTWRIGHT_CHECK(surface.graph != nullptr && surface.graph->count == n, "the graph of the samples");
     SampleMask blocked;
-    if (operation.flood.stop_at_other) blocked = marked(marks, other);
-    chosen = flood_fill(surface, operation.flood, blocked, context);
+    if (operation.flood.stop_at_other) blocked = marked(marks, other_bit(kind));
+    return flood_fill(surface, operation.flood, blocked, context);
   }
-  std::optional<ShapeCover> shape;
-  if (has_shape(operation.mode)) shape.emplace(operation, surface);
+  SampleMask covered(n, 0);
+  if (!has_shape(operation.mode)) return covered;
+  POINTWRIGHT_CHECK(!operation.facing || surface.normal.size() == n, "one normal per sample");
+  POINTWRIGHT_CHECK(has_its_data(operation.shape), "the image or model of the shape");
+  POINTWRIGHT_CHECK(!needs_texcoord(operation.shape) ||
+                        (surface.texcoord != nullptr && surface.texcoord->size() == n),
+                    "one texture coordinate per sample");
+  const ShapeCover shape(operation, surface, context);
+  parallel_for(
+      n,
+      [&](std::size_t begin, std::size_t end) { shape.cover(begin, end, covered.data() + begin, context); },
+      kParallelBlock, context);
+  const auto* screen = std::get_if<ScreenShape>(&operation.shape);
+  if (screen != nullptr && screen->visible) {
+    const SampleMask visible = visible_samples(*screen, surface, context);
+    std::ranges::transform(covered, visible, covered.begin(),
+                           [](std::uint8_t a, std::uint8_t b) { return static_cast<std::uint8_t>(a & b); });
+  }
+  return covered;
+}
 
-  return parallel_sum<std::size_t>(n, 0, [&](std::size_t begin, std::size_t end) {
+std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface, Marks& marks,
+                  const ExecutionContext* context) {
+  const SampleMask covered = covered_samples(operation, kind, surface, marks, context);
+  const Changes changes = changes_of(operation.mode);
+  return parallel_sum<std::size_t>(marks.size(), 0, [&](std::size_t begin, std::size_t end) {
     std::size_t changed = 0;
-    SampleMask covered(end - begin, 0);
-    if (!chosen.empty())
-      std::copy_n(chosen.begin() + static_cast<std::ptrdiff_t>(begin), end - begin, covered.begin());
-    if (shape) shape->cover(begin, end, covered.data(), context);
     if (context != nullptr && context->is_cancelled()) return changed;
     for (std::size_t i = begin; i < end; ++i) {
-      const Change change = covered[i - begin] != 0 ? changes.covered : changes.uncovered;
-      const std::uint8_t mark = changed_mark(marks[i], change, own, other, operation.steal);
+      const Change change = covered[i] != 0 ? changes.covered : changes.uncovered;
+      const std::uint8_t mark =
+          changed_mark(marks[i], change, bit_of(kind), other_bit(kind), operation.steal);
       changed += mark != marks[i] ? 1 : 0;
       marks[i] = mark;
     }
@@ -231,9 +278,8 @@ std::size_t paint(const PaintOperation& operation, RegionKind kind, const PaintS
 }
 
 std::size_t count_marked(const Marks& marks, RegionKind kind) {
-  const auto bit = static_cast<std::uint8_t>(kind);
-  return static_cast<std::size_t>(
-      std::count_if(marks.begin(), marks.end(), [bit](std::uint8_t mark) { return (mark & bit) != 0; }));
+  return static_cast<std::size_t>(std::count_if(
+      marks.begin(), marks.end(), [bit = bit_of(kind)](std::uint8_t mark) { return (mark & bit) != 0; }));
 }
 
 }  // namespace pointwright

@@ -18,6 +18,8 @@ enum class RegionKind : std::uint8_t { kZero = 1, kOne = 2 };
 
 /// Per sample, which regions it is painted with: RegionKind bits. N entries.
 using Marks = std::vector<std::uint8_t>;
+/// A set of samples: one entry each, 0 or 1.
+using SampleMask = std::vector<std::uint8_t>;
 
 enum class PaintMode {
   kAdd,        ///< samples in the shape join the region
@@ -62,21 +64,33 @@ struct PaintOperation {
 /// flood are "seed", "angle" and "radius".
 Result<void> validate(const PaintOperation& operation);
 
+/// Whether what the operation covers follows from where the samples stand, not from their places in model
+/// space alone: on another sampling, or once the surface moved, it may cover another part of the surface.
+bool depends_on_sampling(const PaintOperation& operation);
+
 /// The surface that is painted: its columns belong to the caller.
 struct PaintSurface {
   const Points& position;  ///< relative to `origin`
   const Points& normal;    ///< read only for `facing` and for angles
   const Vec3d& origin;
-  const NeighborGraph* graph = nullptr;  ///< of its samples; read only for kFlood
+  const NeighborGraph* graph = nullptr;  ///< of its samples; read only for kFlood and what is `visible`
+  const std::vector<TexCoord>* texcoord = nullptr;  ///< one a sample; read only for images mapped by them
 };
 
+/// The samples that an operation covers: those in its shape that pass its filters, those that growing takes
+/// in, shrinking gives up or a flood reaches; none where the mode covers nothing. Pre, Cost, Determinism,
+/// Cancels: those of paint()
+SampleMask covered_samples(const PaintOperation& operation, RegionKind kind, const PaintSurface& surface,
+                           const Marks& marks, const ExecutionContext* context = nullptr);
+
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
-/// Pre:         validate(operation)
+/// Pre:         validate(operation); its image or model was found; texture coordinates where it needs them
 /// Cost:        O(N), parallel over samples. A stroke or point set of V vertices adds O(V log V) to sort its
 ///              segments once, O(log V) for each range of kParallelBlock samples, and a test of each of a
 ///              block's 128 samples against the segments within the radius of that block. Long segments whose
 ///              bounding boxes hold all samples are each tested once a range; where all of them pass through
-///              all blocks it is O(N V). Growing and shrinking: near_members(),
+///              all blocks it is O(N V). A model of M samples: O(M) once, O(log M) a
+///              sample near it. Growing and shrinking: near_members(),
 ///              filling: flood_fill()
 /// Determinism: bitwise equal for any thread count
 /// Cancels:     between blocks of samples; the marks are then incomplete and must be dropped

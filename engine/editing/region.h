@@ -56,7 +56,8 @@ class Region {
   /// of distance(). `limits`, where given, holds a limit >= 0 for each (padded to whole SIMD blocks): a point
   /// at least that far gets the limit as its distance and, where farther, no gradient. Low limits are cheap.
   /// Pre:  not empty, finite points (padding included), begin a multiple of kSimdBlock
-  /// Cost: O(log M) a point, sequential: callers cut coherent points into blocks
+  /// Cost: O(log M) for each 128 coherent points that lie far from the balls, and for each dozen nearby;
+  ///       sequential: callers cut coherent points into blocks
   void distances(const Points& points, std::size_t begin, std::size_t end, RegionDistances& result,
                  const std::vector<float>* limits = nullptr) const;
 

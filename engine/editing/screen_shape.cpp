@@ -4,76 +4,35 @@
 #include <cmath>
 
 #include "engine/editing/segment.h"
+#include "engine/editing/shape_checks.h"
 
 namespace pointwright {
 namespace {
 
-constexpr double kMaxMember = 1e12;
 constexpr std::size_t kMaxBands = 256;
-
-Error fault(ErrorCode code, const char* message, const char* field) {
-  return {.code = code, .message = message, .field = field};
-}
-
-Result<void> check_members(const double* members, std::size_t count, const char* field) {
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!std::isfinite(members[i])) return fault(ErrorCode::kNonFinite, "the numbers must be finite", field);
-    if (std::abs(members[i]) > kMaxMember) {
-      Error error = fault(ErrorCode::kOutOfRange, "the numbers must lie within 1e12 of zero", field);
-      error.limit = kMaxMember;
-      error.actual = std::abs(members[i]);
-      return error;
-    }
-  }
-  return {};
-}
-
-Result<void> check_lengths(const double* lengths, std::size_t count, const char* field) {
-  if (auto members = check_members(lengths, count, field); !members) return members;
-  const double least = *std::min_element(lengths, lengths + count);
-  if (least > 0.0) return {};
-  Error error = fault(ErrorCode::kInvalidArgument, "must be greater than 0", field);
-  error.limit = 0.0;
-  error.actual = least;
-  return error;
-}
 
 Result<void> check_vertices(const std::vector<Vec2d>& vertices, std::size_t least) {
   constexpr const char* kField = "shape.outline.vertices";
   const std::size_t count = vertices.size();
   if (count < least || count > kMaxOutlineVertices) {
     Error error = count < least
-                      ? fault(ErrorCode::kInvalidArgument, "the outline has too few vertices", kField)
-                      : fault(ErrorCode::kTooLarge, "an outline has at most 10,000 vertices", kField);
+                      ? shape_error(ErrorCode::kInvalidArgument, "the outline has too few vertices", kField)
+                      : shape_error(ErrorCode::kTooLarge, "an outline has at most 10,000 vertices", kField);
     error.limit = static_cast<double>(count < least ? least : kMaxOutlineVertices);
     error.actual = static_cast<double>(count);
     return error;
   }
   for (const Vec2d& vertex : vertices) {
-    if (auto members = check_members(vertex.data(), 2, kField); !members) return members;
+    if (auto numbers = check_numbers(vertex.data(), 2, kField); !numbers) return numbers;
   }
   return {};
-}
-
-// Rows and columns are scaled first: distances to the eye and depths differ by many orders of magnitude.
-bool is_singular(const std::array<double, 16>& view) {
-  Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(view.data());
-  for (int side = 0; side < 2; ++side) {
-    for (Eigen::Index row = 0; row < 4; ++row) {
-      const double largest = matrix.row(row).cwiseAbs().maxCoeff();
-      if (largest <= 0.0) return true;
-      matrix.row(row) /= largest;
-    }
-    matrix.transposeInPlace();
-  }
-  return !matrix.fullPivLu().isInvertible();
 }
 
 Result<void> validate_outline(const ScreenPolygon& polygon) {
   return check_vertices(polygon.vertices, 3);
 }
 Result<void> validate_outline(const ScreenEllipse& ellipse) {
-  if (auto center = check_members(ellipse.center.data(), 2, "shape.outline.center"); !center) return center;
+  if (auto center = check_numbers(ellipse.center.data(), 2, "shape.outline.center"); !center) return center;
   return check_lengths(ellipse.half_axes.data(), 2, "shape.outline.half_axes");
 }
 Result<void> validate_outline(const ScreenPolyline& line) {
@@ -137,9 +96,9 @@ bool contains_by(const ScreenEllipse& ellipse, const Vec2d& point, std::size_t, 
 }  // namespace
 
 Result<void> validate_screen_shape(const ScreenShape& shape) {
-  if (auto view = check_members(shape.view.data(), shape.view.size(), "shape.view"); !view) return view;
+  if (auto view = check_numbers(shape.view.data(), shape.view.size(), "shape.view"); !view) return view;
   if (is_singular(shape.view))
-    return fault(ErrorCode::kInvalidArgument, "the matrix must not be singular", "shape.view");
+    return shape_error(ErrorCode::kInvalidArgument, "the matrix must not be singular", "shape.view");
   return std::visit([](const auto& outline) { return validate_outline(outline); }, shape.outline);
 }
 

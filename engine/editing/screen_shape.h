@@ -33,12 +33,15 @@ struct ScreenPolyline {
   double width = 0.0;
 };
 
-/// All points that the view projects into the outline, on every depth. Outlines are in normalised device
-/// coordinates; points behind the eye (clip-space w <= 0) are outside.
+/// All points that the view projects into the outline, on every depth, or `visible` samples alone. Outlines
+/// are in normalised device coordinates; points behind the eye (clip-space w <= 0) are outside.
 struct ScreenShape {
   /// Model to clip space, row after row: clip = view * (x, y, z, 1).
   std::array<double, 16> view{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   std::variant<ScreenPolygon, ScreenEllipse, ScreenPolyline> outline;
+  /// Only samples that the view does not hide behind others: see visible_samples(). A choice among samples;
+  /// contains() knows of none and answers for the whole volume.
+  bool visible = false;
 };
 
 /// Errors: kNonFinite, kOutOfRange for members beyond 1e12; kInvalidArgument for a singular view, too few

@@ -11,9 +11,6 @@
 
 namespace pointwright {
 
-/// A set of samples: one entry each, 0 or 1.
-using SampleMask = std::vector<std::uint8_t>;
-
 /// The samples that are not in `members` but stand within `distance` of one that is; distances are computed
 /// in float. None where nobody is a member.
 /// Shapes:      N positions, N members

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "engine/editing/segment.h"
 
@@ -123,6 +124,14 @@ Result<void> validate_one(const ScreenShape& shape) {
   return validate_screen_shape(shape);
 }
 
+Result<void> validate_one(const ImageShape& shape) {
+  return validate_image_shape(shape);
+}
+
+Result<void> validate_one(const ModelShape& shape) {
+  return validate_model_shape(shape);
+}
+
 bool contains_one(const Sphere& sphere, const Vec3d& point) {
   return (point - sphere.center).squaredNorm() <= sphere.radius * sphere.radius;
 }
@@ -162,14 +171,48 @@ bool contains_one(const ScreenShape& shape, const Vec3d& point) {
   return place && outline_contains(shape, *place);
 }
 
+bool contains_one(const ModelShape& shape, const Vec3d& point) {
+  return model_contains(shape, point);
+}
+
 }  // namespace
 
 Result<void> validate(const Shape& shape) {
   return std::visit([](const auto& one) { return validate_one(one); }, shape);
 }
 
-bool contains(const Shape& shape, const Vec3d& point) {
-  return std::visit([&](const auto& one) { return contains_one(one, point); }, shape);
+bool contains(const Shape& shape, const Vec3d& point, const TexCoord* texcoord) {
+  return std::visit(
+      [&](const auto& one) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(one)>, ImageShape>) {
+          return ImageCover(one).covers(point, texcoord);
+        } else {
+          return contains_one(one, point);
+        }
+      },
+      shape);
+}
+
+bool has_its_data(const Shape& shape) {
+  if (const auto* image = std::get_if<ImageShape>(&shape)) return image->image != nullptr;
+  if (const auto* model = std::get_if<ModelShape>(&shape)) return model->cloud != nullptr;
+  return true;
+}
+
+Shape without_data(Shape shape) {
+  if (auto* image = std::get_if<ImageShape>(&shape)) image->image.reset();
+  if (auto* model = std::get_if<ModelShape>(&shape)) model->cloud.reset();
+  return shape;
+}
+
+bool needs_texcoord(const Shape& shape) {
+  const auto* image = std::get_if<ImageShape>(&shape);
+  return image != nullptr && std::holds_alternative<TextureProjection>(image->projection);
+}
+
+bool depends_on_sampling(const Shape& shape) {
+  if (const auto* screen = std::get_if<ScreenShape>(&shape)) return screen->visible;
+  return std::holds_alternative<ImageShape>(shape) || std::holds_alternative<ModelShape>(shape);
 }
 
 std::size_t vertex_count(const Shape& shape) {

@@ -8,15 +8,16 @@
 
 #include "engine/core/result.h"
 #include "engine/core/vector.h"
+#include "engine/editing/image_shape.h"
+#include "engine/editing/model_shape.h"
 #include "engine/editing/screen_shape.h"
+#include "engine/editing/shape_checks.h"
 
 namespace pointwright {
 
 /// Limits of what a shape may hold.
 inline constexpr double kMaxShapeCoordinate = 1e12;
 inline constexpr std::size_t kMaxStrokeVertices = 100'000;
-/// Directions with no component as large as this are "zero".
-inline constexpr double kMinDirectionLength = 1e-100;
 
 /// All points within `radius` of `center`.
 struct Sphere {
@@ -46,16 +47,29 @@ struct HalfSpace {
 /// All of space.
 struct Everything {};
 
-using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything, PointSet, ScreenShape>;
+using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything, PointSet, ScreenShape, ImageShape,
+                           ModelShape>;
 
 /// Finite members within kMaxShapeCoordinate, radii > 0, min <= max, a normal that is not zero, at least one
 /// and at most kMaxStrokeVertices vertices or points.
 /// Errors: kInvalidArgument (field "shape.radius" and the like), kNonFinite, kOutOfRange, kTooLarge.
 Result<void> validate(const Shape& shape);
 
-/// Whether the model-space point lies in the shape. Cost: O(1), O(vertices) for strokes, point
-/// sets and outlines.
-bool contains(const Shape& shape, const Vec3d& point);
+/// Whether the shape holds a sample at a place of model space. Images that are mapped by texture coordinates
+/// hold none without one.
+/// Pre:  an image or a model was found
+/// Cost: O(1), O(vertices) for strokes, point sets and outlines, O(samples) for models
+bool contains(const Shape& shape, const Vec3d& point, const TexCoord* texcoord = nullptr);
+
+/// Whether the image or the model that the shape names is there; true for all other shapes.
+bool has_its_data(const Shape& shape);
+/// The shape as it is recorded: an image or a model by its name alone.
+Shape without_data(Shape shape);
+/// Whether the shape reads the texture coordinates of samples.
+bool needs_texcoord(const Shape& shape);
+
+/// Whether the shape is a choice among samples, not a volume: see PaintOperation's depends_on_sampling().
+bool depends_on_sampling(const Shape& shape);
 
 /// Vertices that the shape counts with against the limit of a painting: those of strokes, point sets and
 /// outlines.

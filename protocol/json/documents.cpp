@@ -86,6 +86,12 @@ JsonDocument to_json(const CloudDocument& cloud) {
                       {"report", to_json(cloud.report)}};
 }
 
+JsonDocument to_json(const ImageDocument& image) {
+  return JsonDocument{{"id", image.id},         {"width", image.width},
+                      {"height", image.height}, {"channels", string_array(image.channels)},
+                      {"bytes", image.bytes},   {"created", to_rfc3339(image.created)}};
+}
+
 JsonDocument to_json(const DecompositionReport& report) {
   return JsonDocument{{"scale", checked_number(report.scale)},
                       {"base_samples", report.base_samples},
@@ -146,6 +152,10 @@ JsonDocument to_json(const InfoDocument& info) {
 
 JsonDocument cloud_list(const std::vector<CloudDocument>& clouds) {
   return JsonDocument{{"clouds", document_array(clouds)}};
+}
+
+JsonDocument image_list(const std::vector<ImageDocument>& images) {
+  return JsonDocument{{"images", document_array(images)}};
 }
 
 JsonDocument session_list(const std::vector<SessionSummary>& sessions) {

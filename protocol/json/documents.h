@@ -37,6 +37,15 @@ struct CloudDocument {
 
 enum class SessionState { kBuilding, kReady, kFailed };
 
+struct ImageDocument {
+  std::string id;
+  std::uint64_t width = 0;   ///< pixels
+  std::uint64_t height = 0;  ///< pixels
+  std::vector<std::string> channels;
+  std::uint64_t bytes = 0;  ///< of the upload
+  TimePoint created;
+};
+
 struct RegionSummary {
   std::uint64_t samples = 0;
   std::uint64_t operations = 0;
@@ -90,12 +99,14 @@ std::string_view session_state_name(SessionState state);
 JsonDocument to_json(const ModelBounds& bounds);
 JsonDocument to_json(const ImportReport& report);
 JsonDocument to_json(const CloudDocument& cloud);
+JsonDocument to_json(const ImageDocument& image);
 JsonDocument to_json(const DecompositionReport& report);
 JsonDocument to_json(const SessionSummary& session);
 JsonDocument to_json(const SessionDocument& session);
 JsonDocument to_json(const EditRecord& record);
 JsonDocument to_json(const InfoDocument& info);
 JsonDocument cloud_list(const std::vector<CloudDocument>& clouds);
+JsonDocument image_list(const std::vector<ImageDocument>& images);
 JsonDocument session_list(const std::vector<SessionSummary>& sessions);
 /// {"region", "samples", "operations"}
 JsonDocument painting_document(RegionKind region, std::uint64_t samples,

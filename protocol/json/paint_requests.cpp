@@ -9,11 +9,16 @@ namespace pointwright::protocol {
 namespace {
 
 // In the order of Shape's alternatives.
-constexpr std::array<std::string_view, 7> kShapeNames{"sphere", "stroke", "box",   "half_space",
-                                                      "all",    "points", "screen"};
+constexpr std::array<std::string_view, 9> kShapeNames{"sphere", "stroke", "box",   "half_space", "all",
+                                                      "points", "screen", "image", "model"};
 static_assert(std::variant_size_v<Shape> == kShapeNames.size());
 // In the order of ScreenShape::outline's alternatives.
 constexpr std::array<std::string_view, 3> kOutlineNames{"polygon", "ellipse", "polyline"};
+// In the order of ImageChannel.
+constexpr std::array<std::string_view, 5> kChannelNames{"luminance", "red", "green", "blue", "alpha"};
+constexpr std::array<std::string_view, 2> kSideNames{"above", "below"};
+// In the order of ImageShape::projection's alternatives.
+constexpr std::array<std::string_view, 2> kProjectionNames{"texture", "planar"};
 // In the order of PaintMode.
 constexpr std::array<std::string_view, 9> kPaintModeNames{"add",   "remove", "intersect", "set",  "invert",
                                                           "clear", "grow",   "shrink",    "flood"};
@@ -87,12 +92,20 @@ std::vector<Vec2d> required_outline_vertices(ObjectReader& object, std::size_t l
   return vertices;
 }
 
-ScreenShape read_screen(ObjectReader& object) {
-  ScreenShape screen;
-  if (const Json* const view = object.required("view")) {
-    const auto numbers = read_numbers(*view, object.pointer_to("view"), object.errors(), screen.view.size());
-    std::ranges::copy(numbers, screen.view.begin());
+/// 16 numbers, row after row.
+ShapeMatrix required_matrix(ObjectReader& object, std::string_view name) {
+  ShapeMatrix matrix{};
+  if (const Json* const member = object.required(name)) {
+    const auto numbers = read_numbers(*member, object.pointer_to(name), object.errors(), matrix.size());
+    std::ranges::copy(numbers, matrix.begin());
   }
+  return matrix;
+}
+
+ScreenShape read_screen(ObjectReader& object) {
+  ScreenShape screen{.view = required_matrix(object, "view"), .outline = {}};
+  if (const Json* const visible = object.optional("visible"))
+    screen.visible = read_bool(*visible, object.pointer_to("visible"), object.errors()).value_or(false);
   const Json* const member = object.required("outline");
   if (member == nullptr) return screen;
   ObjectReader outline(*member, object.pointer_to("outline"), object.errors());
@@ -109,6 +122,58 @@ ScreenShape read_screen(ObjectReader& object) {
   }
   outline.finish();
   return screen;
+}
+
+/// One of the names, or the first.
+std::size_t optional_choice(ObjectReader& object, std::string_view name,
+                            std::span<const std::string_view> names) {
+  const Json* const member = object.optional(name);
+  if (member == nullptr) return 0;
+  return read_choice(*member, object.pointer_to(name), object.errors(), names).value_or(0);
+}
+
+PlanarProjection read_plane(ObjectReader& object) {
+  PlanarProjection plane{.origin = required_vec3(object, "origin"),
+                         .u = required_vec3(object, "u"),
+                         .v = required_vec3(object, "v"),
+                         .depth = std::nullopt};
+  if (const Json* const depth = object.optional("depth")) {
+    const auto ends = read_numbers(*depth, object.pointer_to("depth"), object.errors(), 2);
+    plane.depth = {ends[0], ends[1]};
+  }
+  return plane;
+}
+
+ImageShape read_image(ObjectReader& object) {
+  ImageShape shape;
+  shape.source = required_id(object, "image", "an image");
+  shape.channel = static_cast<ImageChannel>(optional_choice(object, "channel", kChannelNames));
+  if (const Json* const threshold = object.optional("threshold"))
+    shape.threshold =
+        read_number(*threshold, object.pointer_to("threshold"), object.errors(), {.min = 0.0, .max = 1.0})
+            .value_or(0.0);
+  shape.above = optional_choice(object, "side", kSideNames) == 0;
+  const Json* const member = object.required("projection");
+  if (member == nullptr) return shape;
+  ObjectReader projection(*member, object.pointer_to("projection"), object.errors());
+  const auto type = required_choice(projection, "type", kProjectionNames);
+  if (!type) return shape;
+  if (kProjectionNames[*type] == "planar") {
+    shape.projection = read_plane(projection);
+  } else if (const Json* const repeat = projection.optional("repeat")) {
+    shape.projection = TextureProjection{
+        .repeat = read_bool(*repeat, projection.pointer_to("repeat"), object.errors()).value_or(false)};
+  }
+  projection.finish();
+  return shape;
+}
+
+ModelShape read_model(ObjectReader& object) {
+  ModelShape shape;
+  shape.source = required_id(object, "cloud", "a cloud");
+  shape.matrix = required_matrix(object, "matrix");
+  shape.thickness = required_number(object, "thickness");
+  return shape;
 }
 
 Shape read_shape(const Json& value, const std::string& pointer, JsonErrors& errors) {
@@ -129,6 +194,10 @@ Shape read_shape(const Json& value, const std::string& pointer, JsonErrors& erro
     shape = read_point_set(object);
   } else if (kShapeNames[*type] == "screen") {
     shape = read_screen(object);
+  } else if (kShapeNames[*type] == "image") {
+    shape = read_image(object);
+  } else if (kShapeNames[*type] == "model") {
+    shape = read_model(object);
   }
   object.finish();
   return shape;
@@ -235,6 +304,30 @@ void put_members(const ScreenShape& screen, JsonDocument& document) {
   JsonDocument outline{{"type", kOutlineNames[screen.outline.index()]}};
   std::visit([&](const auto& each) { put_outline(each, outline); }, screen.outline);
   document["outline"] = std::move(outline);
+  if (screen.visible) document["visible"] = true;
+}
+void put_projection(const TextureProjection& texture, JsonDocument& document) {
+  document["repeat"] = texture.repeat;
+}
+void put_projection(const PlanarProjection& plane, JsonDocument& document) {
+  document["origin"] = to_json(plane.origin);
+  document["u"] = to_json(plane.u);
+  document["v"] = to_json(plane.v);
+  if (plane.depth) document["depth"] = *plane.depth;
+}
+void put_members(const ImageShape& image, JsonDocument& document) {
+  document["image"] = image.source;
+  document["channel"] = kChannelNames[static_cast<std::size_t>(image.channel)];
+  document["threshold"] = image.threshold;
+  document["side"] = kSideNames[image.above ? 0 : 1];
+  JsonDocument projection{{"type", kProjectionNames[image.projection.index()]}};
+  std::visit([&](const auto& each) { put_projection(each, projection); }, image.projection);
+  document["projection"] = std::move(projection);
+}
+void put_members(const ModelShape& model, JsonDocument& document) {
+  document["cloud"] = model.source;
+  document["matrix"] = model.matrix;
+  document["thickness"] = model.thickness;
 }
 
 }  // namespace

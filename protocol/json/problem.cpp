@@ -80,7 +80,8 @@ constexpr std::array kProblems{
                 "The memory that the operator granted to clouds and sessions is used up; delete some first.",
                 true},
     ProblemInfo{kMalformedCloud, 422, "malformed-cloud", "The file is damaged",
-                "The bytes are not what they claim to be: truncated, inconsistent, or not a point cloud.",
+                "The bytes are not what they claim to be: truncated, inconsistent, or neither a point cloud "
+                "nor an image.",
                 false},
     ProblemInfo{kUnsupportedFormat, 415, "unsupported-format", "The format is not supported",
                 "The bytes are in a format, version or encoding that this server does not read.", false},

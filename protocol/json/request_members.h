@@ -25,6 +25,16 @@ inline double required_number(ObjectReader& object, std::string_view name) {
   return read_number(*member, object.pointer_to(name), object.errors()).value_or(0.0);
 }
 
+/// The id of something; `what`: "an image" and the like.
+inline std::string required_id(ObjectReader& object, std::string_view name, const std::string& what) {
+  const Json* const member = object.required(name);
+  if (member == nullptr) return {};
+  std::string id = read_string(*member, object.pointer_to(name), object.errors()).value_or("");
+  if (member->is_string() && !is_valid_id(id))
+    object.errors().add(object.pointer_to(name), "must be the id of " + what);
+  return id;
+}
+
 inline std::optional<std::size_t> required_choice(ObjectReader& object, std::string_view name,
                                                   std::span<const std::string_view> names) {
   const Json* const member = object.required(name);

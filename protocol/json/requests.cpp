@@ -157,10 +157,7 @@ Parsed<CreateSessionRequest> parse_create_session(const Json& document) {
   JsonErrors errors;
   CreateSessionRequest request;
   ObjectReader object(document, "", errors);
-  if (const Json* const cloud = object.required("cloud")) {
-    request.cloud = read_string(*cloud, "/cloud", errors).value_or("");
-    if (cloud->is_string() && !is_valid_id(request.cloud)) errors.add("/cloud", "must be the id of a cloud");
-  }
+  request.cloud = required_id(object, "cloud", "a cloud");
   if (const Json* const name = object.optional("name")) {
     request.name = read_string(*name, "/name", errors).value_or("");
     if (name->is_string() && !is_valid_name(request.name)) {

@@ -13,6 +13,11 @@ struct Limits {
   std::uint64_t max_samples = 20'000'000;
   std::uint64_t max_clouds = 64;
   std::uint64_t max_cloud_bytes = 4ULL << 30U;
+  std::uint64_t max_images = 64;
+  std::uint64_t max_image_bytes = 1ULL << 30U;
+  std::uint64_t max_image_file_bytes = 256ULL << 20U;
+  std::uint64_t max_image_side = 32'768;
+  std::uint64_t max_image_pixels = 64ULL << 20U;
   std::uint64_t max_sessions = 32;
   std::uint64_t max_session_bytes = 8ULL << 30U;
   std::uint64_t history_bytes = 512ULL << 20U;

@@ -21,6 +21,12 @@ Response upload_cloud(Service& service, const Request& request);
 Response get_cloud(Service& service, const Request& request);
 Response get_cloud_data(Service& service, const Request& request);
 Response delete_cloud(Service& service, const Request& request);
+// images.cpp
+Response list_images(Service& service, const Request& request);
+Response upload_image(Service& service, const Request& request);
+Response get_image(Service& service, const Request& request);
+Response get_image_data(Service& service, const Request& request);
+Response delete_image(Service& service, const Request& request);
 // sessions.cpp
 Response list_sessions(Service& service, const Request& request);
 Response create_session(Service& service, const Request& request);

@@ -13,6 +13,7 @@ Response get_service(Service& service, const Request& request) {
                         {"links",
                          {{"info", "/v1/info"},
                           {"clouds", "/v1/clouds"},
+                          {"images", "/v1/images"},
                           {"sessions", "/v1/sessions"},
                           {"health", "/healthz"},
                           {"readiness", "/readyz"},
@@ -31,10 +32,11 @@ Response get_readiness(Service& service, const Request& request) {
 }
 
 Response get_info(Service& service, const Request&) {
-  protocol::InfoDocument info{.version = POINTWRIGHT_VERSION,
-                              .limits = {},
-                              .formats = {"draco", "ply", "xyz"},
-                              .features = {"preview-stream", "undo", "single-resolution"}};
+  protocol::InfoDocument info{
+      .version = POINTWRIGHT_VERSION,
+      .limits = {},
+      .formats = {"draco", "ply", "xyz"},
+      .features = {"preview-stream", "undo", "single-resolution", "images", "model-regions"}};
   for (const LimitInfo& limit : limit_table())
     info.limits.emplace_back(std::string(limit.name), service.config.limits.*limit.member);
   return json_response(protocol::to_json(info));

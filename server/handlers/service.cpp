@@ -17,11 +17,13 @@ std::size_t pool_threads(const Config& config) {
 Service::Service(Config settings, ServiceParts parts)
     : config(std::move(settings)),
       decode(std::move(parts.decode)),
+      decode_image(std::move(parts.decode_image)),
       assets(std::move(parts.assets)),
       interactive(pool_threads(config), static_cast<int>(config.threads), parts.report_failure),
       background(std::max<std::size_t>(pool_threads(config) / 2, 2), static_cast<int>(config.threads),
                  parts.report_failure),
       clouds(config.limits),
+      images(config.limits),
       sessions(config.limits,
                {.interactive = interactive, .background = background, .build = std::move(parts.build)}),
       upload_memory(config.limits.max_upload_memory),

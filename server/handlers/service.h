@@ -13,6 +13,7 @@
 #include "server/sessions/compute_pool.h"
 #include "server/store/assets.h"
 #include "server/store/cloud_store.h"
+#include "server/store/image_store.h"
 #include "server/store/importer.h"
 #include "server/store/session_store.h"
 
@@ -21,6 +22,7 @@ namespace pointwright::server {
 /// The parts of the daemon that a test may replace.
 struct ServiceParts {
   Decoder decode;
+  ImageDecoder decode_image;
   HierarchyBuilder build;
   AssetTable assets;
   std::function<void(const std::string&)> report_failure = {};  ///< of tasks that nobody waits for
@@ -33,13 +35,15 @@ class Service {
 
   const Config config;
   const Decoder decode;
+  const ImageDecoder decode_image;
   const AssetTable assets;
   // Builders post to strands of the interactive pool: it must outlive the background one.
   ComputePool interactive;  ///< what a hand waits for: painting, previews, edits
   ComputePool background;   ///< what lasts for seconds: building, exporting
   CloudStore clouds;
+  ImageStore images;
   SessionStore sessions;
-  Budget upload_memory;  ///< of clouds that are received or decoded
+  Budget upload_memory;  ///< of clouds and images that are received or decoded
   Budget json_memory;    ///< of documents
   Budget answer_memory;  ///< of files and frames on their way out
   Budget streams;

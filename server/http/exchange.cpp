@@ -116,6 +116,8 @@ std::optional<Problem> Exchange::check_body(const BodyPolicy& policy) const {
     return Problem{
         .kind = ProblemKind::kUnsupportedMediaType,
         .detail = "send model/x-draco, application/x-ply, text/plain (XYZ) or application/octet-stream"};
+  if (policy.kind == BodyPolicy::Kind::kImage && type != "image/png")
+    return Problem{.kind = ProblemKind::kUnsupportedMediaType, .detail = "send image/png"};
   if (length > policy.max_bytes)
     return Problem{.kind = ProblemKind::kBodyTooLarge,
                    .detail = "the body is larger than this route takes",

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
@@ -73,10 +74,10 @@ Error failure(const ChildEnd& end, const ConfineLimits& limits) {
   }
   switch (end.signal) {
     case 0:
-      return end.status == 4 ? too_large("the decoded cloud is larger than a decoder may write")
+      return end.status == 4 ? too_large("what the file decodes to is larger than a decoder may write")
                              : decoder_error("the decoder could not be confined, so the file was not read");
     case SIGXFSZ:
-      return too_large("the decoded cloud is larger than a decoder may write");
+      return too_large("what the file decodes to is larger than a decoder may write");
     case SIGKILL:
       return too_large("decoding the file takes more memory than there is");
     default:
@@ -87,24 +88,29 @@ Error failure(const ChildEnd& end, const ConfineLimits& limits) {
                .field = {}};
 }
 
-DecodeRequest make_request(std::span<const std::byte> bytes, CloudFormat format, const ImportParams& params,
-                           const ConfineLimits& limits) {
-  DecodeRequest request;
-  request.format = static_cast<std::uint64_t>(format);
-  request.drop_non_finite = params.drop_non_finite ? 1 : 0;
-  request.max_samples = params.max_samples;
+// Adds what every request says.
+DecodeRequest with_limits(DecodeRequest request, std::span<const std::byte> bytes,
+                          const ConfineLimits& limits) {
   request.byte_count = bytes.size();
   request.memory_bytes = limits.memory_bytes;
   request.cpu_seconds = static_cast<std::uint64_t>(std::ceil(std::max(1.0, limits.deadline_seconds)));
   return request;
 }
 
-Result<ImportedCloud> decode_in_child(std::span<const std::byte> bytes, CloudFormat format,
-                                      const ImportParams& params, const ConfineLimits& limits,
-                                      const ExecutionContext* context) {
-  const DecodeRequest request = make_request(bytes, format, params, limits);
+// Starts a decoder, waits for its end and hands its answer to `read`. Read: Result<T>(bytes of the answer).
+template <typename Read>
+auto decode_in_child(const DecodeRequest& request, std::span<const std::byte> bytes,
+                     const ConfineLimits& limits, const ExecutionContext* context, const Read& read)
+    -> decltype(read(bytes)) {
+  if (bytes.empty())
+    return Error{.code = ErrorCode::kEmptyCloud, .message = "there are no bytes", .field = {}};
+  DecodeSlots::Lease lease;
+  if (limits.slots != nullptr) {
+    lease = limits.slots->acquire(std::chrono::duration<double>(limits.queue_seconds));
+    if (!lease) return decoder_error("every decoder is busy; none came free in time");
+  }
   const Descriptor input = memory_file("pointwright-upload");
-  const Descriptor output = memory_file("pointwright-cloud");
+  const Descriptor output = memory_file("pointwright-answer");
   std::array<int, 2> ends{-1, -1};
   if (!input.is_open() || !output.is_open() || pipe2(ends.data(), O_CLOEXEC) != 0) {
     return decoder_error("there are no descriptors left for a decoder");
@@ -123,9 +129,16 @@ Result<ImportedCloud> decode_in_child(std::span<const std::byte> bytes, CloudFor
   if (end.by_cancel || end.by_deadline || end.signal != 0 || end.status != 0) return failure(end, limits);
   // The child is gone: nobody but us holds the answer any more.
   const Mapping answer(output);
-  auto decoded = read_answer(answer.bytes());
-  if (decoded && decoded.value().report.format != format) return failure(ChildEnd{.signal = SIGSYS}, limits);
-  return decoded;
+  return read(answer.bytes());
+}
+
+}  // namespace
+
+namespace {
+
+bool fits(const Image& image, const ImageLimits& limits) {
+  return std::max(image.width, image.height) <= limits.max_side &&
+         std::uint64_t{image.width} * image.height <= limits.max_pixels;
 }
 
 }  // namespace
@@ -133,14 +146,34 @@ Result<ImportedCloud> decode_in_child(std::span<const std::byte> bytes, CloudFor
 Result<ImportedCloud> decode_confined(std::span<const std::byte> bytes, CloudFormat format,
                                       const ImportParams& params, const ConfineLimits& limits,
                                       const ExecutionContext* context) {
-  if (bytes.empty())
-    return Error{.code = ErrorCode::kEmptyCloud, .message = "there are no bytes", .field = {}};
-  DecodeSlots::Lease lease;
-  if (limits.slots != nullptr) {
-    lease = limits.slots->acquire(std::chrono::duration<double>(limits.queue_seconds));
-    if (!lease) return decoder_error("every decoder is busy; none came free in time");
-  }
-  return decode_in_child(bytes, format, params, limits, context);
+  DecodeRequest request;
+  request.format = static_cast<std::uint64_t>(format);
+  request.drop_non_finite = params.drop_non_finite ? 1 : 0;
+  request.max_samples = params.max_samples;
+  request = with_limits(request, bytes, limits);
+  return decode_in_child(request, bytes, limits, context,
+                         [&](std::span<const std::byte> answer) -> Result<ImportedCloud> {
+                           auto decoded = read_answer(answer);
+                           if (decoded && decoded.value().report.format != format)
+                             return failure(ChildEnd{.signal = SIGSYS}, limits);
+                           return decoded;
+                         });
+}
+
+Result<Image> decode_image_confined(std::span<const std::byte> bytes, const ImageLimits& image_limits,
+                                    const ConfineLimits& limits, const ExecutionContext* context) {
+  DecodeRequest request;
+  request.subject = DecodeSubject::kImage;
+  request.max_side = image_limits.max_side;
+  request.max_pixels = image_limits.max_pixels;
+  request = with_limits(request, bytes, limits);
+  return decode_in_child(request, bytes, limits, context,
+                         [&](std::span<const std::byte> answer) -> Result<Image> {
+                           auto image = read_image_answer(answer);
+                           if (image && !fits(image.value(), image_limits))
+                             return failure(ChildEnd{.signal = SIGSYS}, limits);
+                           return image;
+                         });
 }
 
 }  // namespace pointwright

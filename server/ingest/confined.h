@@ -1,6 +1,6 @@
 #pragma once
-// Untrusted cloud files are decoded in a process of their own that may do nothing but compute, and may die of
-// it.
+// Untrusted files of clouds and images are decoded in a process of their own that may do nothing but compute,
+// and may die of it.
 //
 // The daemon starts itself anew (/proc/self/exe --decode-child): no file, socket, thread or program can be
 // reached from there, memory, time and output are bounded, and the only things shared are the bytes in, the
@@ -16,6 +16,7 @@
 #include "engine/core/result.h"
 #include "engine/io/cloud_io.h"
 #include "server/ingest/decode_slots.h"
+#include "server/ingest/png_reader.h"
 
 namespace pointwright {
 
@@ -40,6 +41,10 @@ struct ConfineLimits {
 Result<ImportedCloud> decode_confined(std::span<const std::byte> bytes, CloudFormat format,
                                       const ImportParams& params, const ConfineLimits& limits,
                                       const ExecutionContext* context = nullptr);
+
+/// read_png() (png_reader.h) in a confined process, within the same limits and with the same further errors.
+Result<Image> decode_image_confined(std::span<const std::byte> bytes, const ImageLimits& image_limits,
+                                    const ConfineLimits& limits, const ExecutionContext* context = nullptr);
 
 /// The decoder's side: main() returns this when argv[1] is kDecodeChildArgument. Never called otherwise.
 int decode_child_main();

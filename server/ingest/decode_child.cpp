@@ -12,6 +12,7 @@
 #include "engine/io/draco_gate.h"
 #include "server/ingest/confined.h"
 #include "server/ingest/exchange_record.h"
+#include "server/ingest/png_reader.h"
 #include "server/ingest/sandbox.h"
 
 namespace pointwright {
@@ -45,10 +46,19 @@ std::uint64_t memory_for(std::span<const std::byte> bytes, CloudFormat format, c
   return 64 * kMiB + c.points * (64 + 4 * c.sample_bytes);
 }
 
-Result<ImportedCloud> decode(std::span<const std::byte> bytes, CloudFormat format,
-                             const ImportParams& params) {
+// The image itself, libpng's rows and tables, and what inflating takes.
+std::uint64_t memory_for_image(std::span<const std::byte> bytes, const ImageLimits& limits) {
+  const auto claim = png_gate(bytes, limits);
+  if (!claim) return 64 * kMiB;
+  return 64 * kMiB + claim.value().value_bytes + std::uint64_t{claim.value().height} * 16 +
+         std::uint64_t{claim.value().width} * 64;
+}
+
+// What reading gives, or why it gives nothing.
+template <typename Read>
+auto guarded(const Read& read) -> decltype(read()) {
   try {
-    return decode_cloud(bytes, format, params);
+    return read();
   } catch (const std::bad_alloc&) {
     return Error{.code = ErrorCode::kTooLarge,
                  .message = "decoding the file takes more memory than its size warrants",
@@ -56,6 +66,37 @@ Result<ImportedCloud> decode(std::span<const std::byte> bytes, CloudFormat forma
   } catch (const std::exception&) {
     return Error{.code = ErrorCode::kMalformedData, .message = "the file cannot be decoded", .field = {}};
   }
+}
+
+CloudFormat cloud_format(const DecodeRequest& request) {
+  return static_cast<CloudFormat>(request.format);
+}
+ImportParams import_params(const DecodeRequest& request) {
+  return {.max_samples = request.max_samples, .drop_non_finite = request.drop_non_finite != 0};
+}
+ImageLimits image_limits(const DecodeRequest& request) {
+  return {.max_side = request.max_side, .max_pixels = request.max_pixels};
+}
+
+void answer_cloud(std::span<const std::byte> bytes, const DecodeRequest& request) {
+  const auto cloud =
+      guarded([&] { return decode_cloud(bytes, cloud_format(request), import_params(request)); });
+  if (!cloud) return write_all(error_answer(cloud.error()));
+  const auto kind = AnswerKind::kCloud;
+  write_all(std::as_bytes(std::span(&kind, 1)));
+  write_cloud_blob(cloud.value(), write_all);
+}
+
+void answer_image(std::span<const std::byte> bytes, const DecodeRequest& request) {
+  const auto read = guarded([&] { return read_png(bytes, image_limits(request)); });
+  if (!read) return write_all(error_answer(read.error()));
+  const Image& image = read.value();
+  const ImageHead head{.width = image.width,
+                       .height = image.height,
+                       .channels = image.channels,
+                       .bytes_per_value = image.bytes_per_value};
+  write_all(std::as_bytes(std::span(&head, 1)));
+  write_all(image.values);
 }
 
 }  // namespace
@@ -73,24 +114,20 @@ int decode_child_main() {
   if (mapped == MAP_FAILED) return kNoRequest;
   const std::span<const std::byte> bytes(static_cast<const std::byte*>(mapped) + sizeof(request),
                                          request.byte_count);
-  const auto format = static_cast<CloudFormat>(request.format);
-  const ImportParams params{.max_samples = request.max_samples,
-                            .drop_non_finite = request.drop_non_finite != 0};
+  const bool is_image = request.subject == DecodeSubject::kImage;
 
   const std::uint64_t base = address_space_bytes();
   const bool is_confined = limit_resources(request.cpu_seconds, request.memory_bytes) &&
                            limit_address_space(base, request.memory_bytes) && forbid_system_calls();
   if (!is_confined) return kNotConfined;
   // From here on the bytes may be looked at.
-  const std::uint64_t needed = memory_for(bytes, format, params);
+  const std::uint64_t needed = is_image ? memory_for_image(bytes, image_limits(request))
+                                        : memory_for(bytes, cloud_format(request), import_params(request));
   if (!limit_address_space(base, std::min(needed, request.memory_bytes))) return kNotConfined;
-  const auto result = decode(bytes, format, params);
-  if (!result) {
-    write_all(error_answer(result.error()));
+  if (is_image) {
+    answer_image(bytes, request);
   } else {
-    const auto kind = AnswerKind::kCloud;
-    write_all(std::as_bytes(std::span(&kind, 1)));
-    write_cloud_blob(result.value(), write_all);
+    answer_cloud(bytes, request);
   }
   _exit(kAnswered);
 }

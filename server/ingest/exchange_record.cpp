@@ -27,6 +27,30 @@ Error unreadable() {
                .field = {}};
 }
 
+AnswerKind kind_of(std::span<const std::byte> answer) {
+  auto kind = AnswerKind::kNone;
+  if (answer.size() >= sizeof(kind)) std::memcpy(&kind, answer.data(), sizeof(kind));
+  return kind;
+}
+
+// The error that the answer holds, or that it is none.
+Error read_error(std::span<const std::byte> answer) {
+  ErrorHead head;
+  if (kind_of(answer) != AnswerKind::kError || answer.size() < sizeof(head)) return unreadable();
+  std::memcpy(&head, answer.data(), sizeof(head));
+  const std::size_t rest = answer.size() - sizeof(head);
+  const bool sizes_fit = head.message_bytes <= kLongestText && head.field_bytes <= kLongestText &&
+                         head.message_bytes + head.field_bytes == rest;
+  if (!sizes_fit || head.code > static_cast<std::uint32_t>(ErrorCode::kCancelled)) return unreadable();
+  const auto* text = reinterpret_cast<const char*>(answer.data()) + sizeof(head);
+  Error error{.code = static_cast<ErrorCode>(head.code),
+              .message = clean_text({text, head.message_bytes}),
+              .field = clean_text({text + head.message_bytes, head.field_bytes})};
+  if ((head.has_numbers & 1U) != 0 && std::isfinite(head.limit)) error.limit = head.limit;
+  if ((head.has_numbers & 2U) != 0 && std::isfinite(head.actual)) error.actual = head.actual;
+  return error;
+}
+
 }  // namespace
 
 std::vector<std::byte> error_answer(const Error& error) {
@@ -47,24 +71,24 @@ std::vector<std::byte> error_answer(const Error& error) {
 }
 
 Result<ImportedCloud> read_answer(std::span<const std::byte> answer) {
-  auto kind = AnswerKind::kNone;
-  if (answer.size() < sizeof(kind)) return unreadable();
-  std::memcpy(&kind, answer.data(), sizeof(kind));
-  if (kind == AnswerKind::kCloud) return read_cloud_blob(answer.subspan(sizeof(kind)));
-  ErrorHead head;
-  if (kind != AnswerKind::kError || answer.size() < sizeof(head)) return unreadable();
+  if (kind_of(answer) == AnswerKind::kCloud) return read_cloud_blob(answer.subspan(sizeof(AnswerKind)));
+  return read_error(answer);
+}
+
+Result<Image> read_image_answer(std::span<const std::byte> answer) {
+  ImageHead head;
+  if (kind_of(answer) != AnswerKind::kImage) return read_error(answer);
+  if (answer.size() < sizeof(head)) return unreadable();
   std::memcpy(&head, answer.data(), sizeof(head));
-  const std::size_t rest = answer.size() - sizeof(head);
-  const bool sizes_fit = head.message_bytes <= kLongestText && head.field_bytes <= kLongestText &&
-                         head.message_bytes + head.field_bytes == rest;
-  if (!sizes_fit || head.code > static_cast<std::uint32_t>(ErrorCode::kCancelled)) return unreadable();
-  const auto* text = reinterpret_cast<const char*>(answer.data()) + sizeof(head);
-  Error error{.code = static_cast<ErrorCode>(head.code),
-              .message = clean_text({text, head.message_bytes}),
-              .field = clean_text({text + head.message_bytes, head.field_bytes})};
-  if ((head.has_numbers & 1U) != 0 && std::isfinite(head.limit)) error.limit = head.limit;
-  if ((head.has_numbers & 2U) != 0 && std::isfinite(head.actual)) error.actual = head.actual;
-  return error;
+  Image image{.width = head.width,
+              .height = head.height,
+              .channels = head.channels,
+              .bytes_per_value = head.bytes_per_value,
+              .values = {}};
+  const std::span<const std::byte> values = answer.subspan(sizeof(head));
+  image.values.assign(values.begin(), values.end());
+  if (!is_valid(image)) return unreadable();
+  return image;
 }
 
 }  // namespace pointwright

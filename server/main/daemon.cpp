@@ -100,8 +100,10 @@ int run_daemon(const Config& config) {
     for (const std::string& name : config.unknown_variables)
       log.write(LogLevel::kWarn, "unknown-variable", {{"name", name}});
     raise_descriptor_limit(config, log);
+    const auto decoders = std::make_shared<DecodeSlots>(static_cast<int>(config.limits.max_decoders));
     Service service(config,
-                    {.decode = confined_decoder(config.limits),
+                    {.decode = confined_decoder(decoders),
+                     .decode_image = confined_image_decoder(config.limits, decoders),
                      .build = build_hierarchy,
                      .assets = config.web_root.empty() ? AssetTable() : AssetTable::load(config.web_root),
                      .report_failure = [&log](const std::string& text) {

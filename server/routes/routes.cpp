@@ -24,6 +24,11 @@ constexpr std::array kRoutes = {
     Route{kGet, "/v1/clouds/{id}", Body::kNone, get_cloud},
     Route{kDelete, "/v1/clouds/{id}", Body::kNone, delete_cloud},
     Route{kGet, "/v1/clouds/{id}/data", Body::kNone, get_cloud_data},
+    Route{kGet, "/v1/images", Body::kNone, list_images},
+    Route{kPost, "/v1/images", Body::kImage, upload_image},
+    Route{kGet, "/v1/images/{id}", Body::kNone, get_image},
+    Route{kDelete, "/v1/images/{id}", Body::kNone, delete_image},
+    Route{kGet, "/v1/images/{id}/data", Body::kNone, get_image_data},
     Route{kGet, "/v1/sessions", Body::kNone, list_sessions},
     Route{kPost, "/v1/sessions", Body::kJson, create_session},
     Route{kGet, "/v1/sessions/{id}", Body::kNone, get_session},
@@ -62,6 +67,8 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
       return {.kind = route.body, .max_bytes = limits.max_json_bytes};
     case Body::kCloud:
       return {.kind = route.body, .max_bytes = limits.max_upload_bytes};
+    case Body::kImage:
+      return {.kind = route.body, .max_bytes = limits.max_image_file_bytes};
   }
   return {};
 }
@@ -70,11 +77,14 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
 /// upload keeps a hand waiting. A body for which there is no room now is refused before it is read; one over
 /// its limit is let through: the fence refuses it.
 Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const RequestHead& head) {
-  Budget& memory = policy.kind == Body::kCloud ? service.upload_memory : service.json_memory;
+  const bool is_upload = policy.kind == Body::kCloud || policy.kind == Body::kImage;
+  Budget& memory = is_upload ? service.upload_memory : service.json_memory;
   const std::uint64_t length = head.content_length.value_or(0);
   if (length > policy.max_bytes) return &memory;
   if (policy.kind == Body::kCloud)
     if (auto room = service.clouds.check_room(); !room.ok()) return room.problem();
+  if (policy.kind == Body::kImage)
+    if (auto room = service.images.check_room(); !room.ok()) return room.problem();
   const std::uint64_t held = memory.held();
   if (length > memory.total() - held)
     return Problem{.kind = ProblemKind::kOverloaded,

@@ -69,7 +69,8 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
   const PaintSurface surface{.position = finest.position,
                              .normal = finest.normal,
                              .origin = params_.cloud->origin,
-                             .graph = rest_.graph.get()};
+                             .graph = rest_.graph.get(),
+                             .texcoord = &params_.cloud->texcoord};
   for (const PaintOperation& operation : operations) {
     pointwright::paint(operation, kind, surface, *marks, &context_);
     if (auto open = check_open(); !open.ok()) return open.problem();
@@ -81,8 +82,10 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, std::vector<PaintOpe
   Document after = *before;
   auto list = std::make_shared<OperationList>();
   if (append) *list = *painting.operations;
-  for (PaintOperation& operation : operations)
+  for (PaintOperation& operation : operations) {
+    operation.shape = without_data(std::move(operation.shape));
     list->push_back(std::make_shared<const PaintOperation>(std::move(operation)));
+  }
   Painting& painted = kind == RegionKind::kZero ? after.zero : after.one;
   painted.operations = std::move(list);
   painted.vertices = vertices;

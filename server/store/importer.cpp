@@ -1,5 +1,7 @@
 #include "server/store/importer.h"
 
+#include <utility>
+
 #include "engine/io/decoded_cloud.h"
 #include "server/base/random_id.h"
 #include "server/ingest/confined.h"
@@ -10,9 +12,9 @@ namespace pointwright::server {
 using protocol::Problem;
 using protocol::ProblemKind;
 
-Decoder confined_decoder(const Limits& limits) {
-  auto slots = std::make_shared<DecodeSlots>(static_cast<int>(limits.max_decoders));
-  return [slots](std::span<const std::byte> bytes, CloudFormat format, const ImportParams& params) {
+Decoder confined_decoder(std::shared_ptr<DecodeSlots> slots) {
+  return [slots = std::move(slots)](std::span<const std::byte> bytes, CloudFormat format,
+                                    const ImportParams& params) {
     ConfineLimits confine;
     confine.slots = slots.get();
     return decode_confined(bytes, format, params, confine);

@@ -2,10 +2,12 @@
 // From uploaded bytes to a stored cloud.
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 
 #include "engine/io/cloud_io.h"
+#include "server/ingest/decode_slots.h"
 #include "server/sessions/compute_pool.h"
 #include "server/store/cloud_store.h"
 
@@ -15,8 +17,8 @@ namespace pointwright::server {
 using Decoder =
     std::function<Result<ImportedCloud>(std::span<const std::byte>, CloudFormat, const ImportParams&)>;
 
-/// The confined decoder, with at most limits.max_decoders at once.
-Decoder confined_decoder(const Limits& limits);
+/// The confined decoder; the slots are those of all decoders.
+Decoder confined_decoder(std::shared_ptr<DecodeSlots> slots);
 
 struct ImportRequest {
   std::string name;

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/editing/ball_cover.h"
 #include "engine/editing/edit_plan.h"
 #include "engine/editing/painting.h"
 #include "tests/bench/benchmarks.h"
@@ -107,10 +108,81 @@ void bench_region_query(BenchReport& report) {
   });
 }
 
+// Half of the samples, with a ragged border.
+void bench_cover(BenchReport& report, const Size& size) {
+  const std::string name = std::string("cover.") + size.name;
+  if (!report.wants(name)) return;
+  const Cloud cloud = ordered_scan(size.samples);
+  SampleMask members(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Vec3f p = cloud.position[i];
+    const float border = 0.02F * std::sin(90.0F * p.y()) + 0.02F * std::sin(170.0F * p.z() + 30.0F * p.y());
+    members[i] = p.x() > border ? 1 : 0;
+  }
+  report.time(name, "ms", static_cast<double>(cloud.size()),
+              [&] { ball_cover(cloud.position, members, cloud.origin); });
+}
+
+// An outline around the front of half of the torus.
+void bench_visible(BenchReport& report, const Size& size) {
+  const std::string name = std::string("paint.visible.") + size.name;
+  if (!report.wants(name)) return;
+  const MultiresSurface surface = one_band_surface(ordered_scan(size.samples));
+  const Level& finest = surface.finest();
+  const NeighborGraph graph = build_neighbor_graph(finest.position, 10);
+  const Vec3d origin = Vec3d::Zero();
+  const PaintSurface painted_on{
+      .position = finest.position, .normal = finest.normal, .origin = origin, .graph = &graph};
+  // The eye at (0, 0, 4), looking down; the torus reaches to 1.4.
+  const PaintOperation operation{
+      .shape = ScreenShape{.view = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, -1.02, 3.88, 0, 0, -1, 4},
+                           .outline = ScreenPolygon{.vertices = {{-1, -1}, {0, -1}, {0, 1}, {-1, 1}}},
+                           .visible = true}};
+  report.time(name, "ms", static_cast<double>(size.samples), [&] {
+    Marks marks(size.samples, 0);
+    paint(operation, RegionKind::kZero, painted_on, marks);
+  });
+}
+
+// A region from an image that lies across the scan, and one from another scan of the same size.
+void bench_outside_data(BenchReport& report) {
+  if (!report.wants("paint.image.2m") && !report.wants("paint.model.2m")) return;
+  const Cloud scan = ordered_scan(2'000'000);
+  const auto items = static_cast<double>(scan.size());
+  const PaintSurface surface{.position = scan.position, .normal = scan.normal, .origin = Vec3d::Zero()};
+  Image image{.width = 2048, .height = 2048, .channels = 4, .values = {}};
+  image.values.resize(value_bytes(image));
+  for (std::size_t i = 0; i < image.values.size(); ++i)
+    image.values[i] = static_cast<std::byte>(i % 4 == 3 ? 255 : (i >> 9U) & 255U);
+  const PaintOperation by_image{
+      .shape = ImageShape{.source = {},
+                          .image = std::make_shared<const Image>(std::move(image)),
+                          .projection = PlanarProjection{.origin = Vec3d(-1.5, -1.5, 0.0),
+                                                         .u = Vec3d(3.0, 0.0, 0.0),
+                                                         .v = Vec3d(0.0, 3.0, 0.0),
+                                                         .depth = std::nullopt}}};
+  report.time("paint.image.2m", "ms", items, [&] {
+    Marks marks(scan.size(), 0);
+    paint(by_image, RegionKind::kOne, surface, marks);
+  });
+  ModelShape model{.source = {}, .cloud = std::make_shared<const Cloud>(scan), .thickness = 0.01};
+  model.matrix[3] = 0.7;  // two rings, one through the other
+  const PaintOperation by_model{.shape = std::move(model)};
+  report.time("paint.model.2m", "ms", items, [&] {
+    Marks marks(scan.size(), 0);
+    paint(by_model, RegionKind::kOne, surface, marks);
+  });
+}
+
 }  // namespace
 
 void bench_editing(BenchReport& report) {
   bench_region_query(report);
+  for (const Size& size : {Size{"150k", 150'000}, Size{"2m", 2'000'000}}) {
+    bench_cover(report, size);
+    bench_visible(report, size);
+  }
+  bench_outside_data(report);
   for (const Size& size : {Size{"148k", 148'000}, Size{"437k", 437'645}, Size{"2m", 2'000'000}}) {
     bench_size(report, size);
   }

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "tests/editing/editing_support.h"
+#include "tests/support/surfaces.h"
 
 namespace pointwright {
 namespace {
@@ -141,6 +142,38 @@ TEST_CASE("limits cut distances off and change nothing below") {
   CHECK(wrong == 0);
   CHECK(below > 50);
   CHECK(below < 400);
+}
+
+TEST_CASE("distances along a coherent order are exact inside the balls, near them and far away") {
+  const Points sheet = test::coherent(test::random_points(4000, 31));
+  for (const float thickness : {0.01F, 1.0F}) {  // a surface, and a cloud of balls
+    Points centers(3000);
+    for (std::size_t i = 0; i < centers.size(); ++i)
+      centers.set(i, sheet[i].cwiseProduct(Vec3f(1.0F, 1.0F, thickness)));
+    const std::vector<float> radii = random_radii(3000, 32, 0.05F);
+    const Region region(centers, radii, BallOrder::kCoherent);
+    for (const float away : {0.0F, 0.3F, 30.0F}) {
+      CAPTURE(thickness);
+      CAPTURE(away);
+      Points queries(2000);
+      for (std::size_t i = 0; i < queries.size(); ++i)
+        queries.set(i, 0.2F * sheet[2 * i] + Vec3f(0.0F, 0.0F, away));
+      test::on_every_instruction_set([&] { check_exact(region, centers, radii, queries); });
+    }
+  }
+}
+
+TEST_CASE("thousands of balls that are all as near as the others are compared one by one") {
+  // Balls on a sphere, seen from around its centre: none of them can be ruled out.
+  Points centers = test::random_points(3000, 33);
+  for (std::size_t i = 0; i < centers.size(); ++i) centers.set(i, centers[i].normalized());
+  Points queries = test::coherent(test::random_points(300, 34));
+  for (std::size_t i = 0; i < queries.size(); ++i) queries.set(i, (i % 50 == 0 ? 0.0F : 0.02F) * queries[i]);
+  for (const float radius : {0.0F, 0.01F}) {
+    const std::vector<float> radii(centers.size(), radius);
+    const Region region(centers, radii);
+    test::on_every_instruction_set([&] { check_exact(region, centers, radii, queries); });
+  }
 }
 
 TEST_CASE("a region without balls has no distance") {

@@ -11,6 +11,7 @@ void try_draco(std::span<const std::byte> bytes);  ///< the gate, then the decod
 void try_ply(std::span<const std::byte> bytes);    ///< reader, finishing, and writer and reader again
 void try_xyz(std::span<const std::byte> bytes);    ///< the same
 void try_cloud_blob(std::span<const std::byte> bytes);  ///< the daemon's side of the confined decoder
+void try_png(std::span<const std::byte> bytes);         ///< the gate, then the decoder behind it
 void try_frame(std::span<const std::byte> bytes);       ///< the decoder of sample frames
 void try_stream(std::span<const std::byte> bytes);      ///< records of a stream, cut anywhere
 void try_json(std::span<const std::byte> bytes);        ///< the text, then every request's parser

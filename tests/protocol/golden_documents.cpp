@@ -39,6 +39,15 @@ CloudDocument cloud() {
           .report = report()};
 }
 
+ImageDocument image() {
+  return {.id = "i7k8l9m0n1o2p-q_r3s4t5",
+          .width = 1024,
+          .height = 768,
+          .channels = {"red", "green", "blue", "alpha"},
+          .bytes = 48'213,
+          .created = created()};
+}
+
 SessionDocument building() {
   SessionDocument session;
   session.summary = {.id = kSessionId,
@@ -92,7 +101,6 @@ std::vector<PaintOperation> operations() {
            .shape = HalfSpace{.point = Vec3d(0.0, 0.05, 0.0), .normal = Vec3d(0.0, -1.0, 0.0)}},
           {.mode = PaintMode::kAdd,
            .shape = Stroke{.vertices = {Vec3d(0.1, 0.1, 0.05), Vec3d(0.11, 0.1, 0.05)}, .radius = 0.004},
-           .facing = Vec3d(0.0, 0.0, 1.0),
            .steal = true}};
 }
 
@@ -181,6 +189,8 @@ std::vector<File> document_files() {
   const std::vector<std::pair<std::string, JsonDocument>> documents{
       {"cloud", to_json(cloud())},
       {"cloud-list", cloud_list({cloud()})},
+      {"image", to_json(image())},
+      {"image-list", image_list({image()})},
       {"session-building", to_json(building())},
       {"session", to_json(ready())},
       {"session-failed", to_json(failed())},

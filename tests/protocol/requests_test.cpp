@@ -135,6 +135,13 @@ TEST_CASE("screen shapes have a view of 16 numbers and one outline") {
   CHECK(screen.view[15] == 5.0);
   CHECK(std::get<ScreenPolyline>(screen.outline).vertices[1] == Vec2d(1, 2));
   CHECK(std::get<ScreenPolyline>(screen.outline).width == 0.25);
+  CHECK_FALSE(screen.visible);
+  const std::string ellipse = R"(,"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]})";
+  const auto seen =
+      accepted(R"({"mode":"set","shape":{"type":"screen",)" + view + ellipse + R"(,"visible":true}})",
+               parse_paint_operation);
+  CHECK(std::get<ScreenShape>(seen.shape).visible);
+  CHECK(faults(view + ellipse + R"(,"visible":1)") == Pointers{"/shape/visible"});
   CHECK(faults(view) == Pointers{"/shape/outline"});
   CHECK(faults(R"("view":[1,2],"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]})") ==
         Pointers{"/shape/view"});
@@ -152,6 +159,84 @@ TEST_CASE("screen shapes have a view of 16 numbers and one outline") {
       refused(
           R"({"mode":"add","shape":{"type":"screen","view":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,0],"outline":{"type":"ellipse","center":[0,0],"half_axes":[1,1]}}})",
           parse_paint_operation) == Pointers{"/shape/view"});
+}
+
+TEST_CASE("images have a projection, and defaults for everything else") {
+  const std::string id = std::string(R"("image":")") + kId + "\"";
+  const auto shape = [](const std::string& members) {
+    return R"({"mode":"add","shape":{"type":"image",)" + members + "}}";
+  };
+  const auto plain = accepted(shape(id + R"(,"projection":{"type":"texture"})"), parse_paint_operation);
+  const auto& texture = std::get<ImageShape>(plain.shape);
+  CHECK(texture.source == kId);
+  CHECK(texture.image == nullptr);
+  CHECK(texture.channel == ImageChannel::kLuminance);
+  CHECK(texture.threshold == 0.5);
+  CHECK(texture.above);
+  CHECK_FALSE(std::get<TextureProjection>(texture.projection).repeat);
+  const auto full =
+      accepted(shape(id + R"(,"channel":"alpha","threshold":1,"side":"below","projection":{"type":"planar",)"
+                          R"("origin":[1,2,3],"u":[1,0,0],"v":[1,1,0],"depth":[-1,2]})"),
+               parse_paint_operation);
+  const auto& planar = std::get<ImageShape>(full.shape);
+  CHECK(planar.channel == ImageChannel::kAlpha);
+  CHECK(planar.threshold == 1.0);
+  CHECK_FALSE(planar.above);
+  const auto& plane = std::get<PlanarProjection>(planar.projection);
+  CHECK(plane.origin == Vec3d(1, 2, 3));
+  CHECK(plane.v == Vec3d(1, 1, 0));
+  REQUIRE(plane.depth.has_value());
+  CHECK((*plane.depth)[1] == 2.0);
+  const auto faults = [&](const std::string& members) {
+    return refused(shape(members), parse_paint_operation);
+  };
+  const std::string by_texture = R"(,"projection":{"type":"texture"})";
+  CHECK(faults(R"("projection":{"type":"texture"})") == Pointers{"/shape/image"});
+  CHECK(faults(R"("image":"nobody")" + by_texture) == Pointers{"/shape/image"});
+  CHECK(faults(id) == Pointers{"/shape/projection"});
+  CHECK(faults(id + R"(,"projection":{"type":"sphere"})") == Pointers{"/shape/projection/type"});
+  CHECK(faults(id + R"(,"projection":{"type":"texture","u":[1,0,0]})") == Pointers{"/shape/projection/u"});
+  CHECK(faults(id + R"(,"projection":{"type":"texture","repeat":1})") ==
+        Pointers{"/shape/projection/repeat"});
+  CHECK(faults(id + by_texture + R"(,"channel":"hue")") == Pointers{"/shape/channel"});
+  CHECK(faults(id + by_texture + R"(,"side":"left")") == Pointers{"/shape/side"});
+  CHECK(faults(id + by_texture + R"(,"threshold":1.5)") == Pointers{"/shape/threshold"});
+  const auto planar_faults = [&](const std::string& members) {
+    return faults(id + R"(,"projection":{"type":"planar",)" + members + "}");
+  };
+  CHECK(planar_faults(R"("origin":[0,0,0],"u":[1,0,0])") == Pointers{"/shape/projection/v"});
+  CHECK(planar_faults(R"("origin":[0,0,0],"u":[1,0,0],"v":[2,0,0])") == Pointers{"/shape/projection/v"});
+  CHECK(planar_faults(R"("origin":[0,0,0],"u":[0,0,0],"v":[2,0,0])") == Pointers{"/shape/projection/u"});
+  CHECK(planar_faults(R"("origin":[0,0,0],"u":[1,0,0],"v":[0,1,0],"depth":[1])") ==
+        Pointers{"/shape/projection/depth"});
+  CHECK(planar_faults(R"("origin":[0,0,0],"u":[1,0,0],"v":[0,1,0],"depth":[2,1])") ==
+        Pointers{"/shape/projection/depth"});
+}
+
+TEST_CASE("models have a cloud, an affine matrix and a thickness") {
+  const auto shape = [](const std::string& members) {
+    return R"({"mode":"add","shape":{"type":"model",)" + members + "}}";
+  };
+  const std::string id = std::string(R"("cloud":")") + kId + "\"";
+  const std::string matrix = R"(,"matrix":[0,-1,0,5,1,0,0,6,0,0,2,7,0,0,0,1])";
+  const auto read = accepted(shape(id + matrix + R"(,"thickness":0.25)"), parse_paint_operation);
+  const auto& model = std::get<ModelShape>(read.shape);
+  CHECK(model.source == kId);
+  CHECK(model.cloud == nullptr);
+  CHECK(model.matrix[1] == -1.0);
+  CHECK(model.matrix[11] == 7.0);
+  CHECK(model.thickness == 0.25);
+  const auto faults = [&](const std::string& members) {
+    return refused(shape(members), parse_paint_operation);
+  };
+  CHECK(faults(id + matrix) == Pointers{"/shape/thickness"});
+  CHECK(faults(id + matrix + R"(,"thickness":0)") == Pointers{"/shape/thickness"});
+  CHECK(faults(R"("cloud":7)" + matrix + R"(,"thickness":1)") == Pointers{"/shape/cloud"});
+  CHECK(faults(id + R"(,"matrix":[1,0,0],"thickness":1)") == Pointers{"/shape/matrix"});
+  CHECK(faults(id + R"(,"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0.5,1],"thickness":1)") ==
+        Pointers{"/shape/matrix"});
+  CHECK(faults(id + R"(,"matrix":[1,0,0,0,0,1,0,0,1,1,0,0,0,0,0,1],"thickness":1)") ==
+        Pointers{"/shape/matrix"});
 }
 
 TEST_CASE("floods have a seed and any bounds") {
@@ -333,7 +418,7 @@ TEST_CASE("what was read is written back and read again to the bit") {
        R"({"mode":"add","shape":{"type":"points","points":[[0.1,0.0,2.0]],"radius":0.5}})",
        R"({"mode":"add","shape":{"type":"points","points":[[0.1,0.0,2.0],[1.0,0.0,0.0]],"radii":[0.5,0.25]}})",
        R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"polygon","vertices":[[0.0,0.1],[1.0,0.0],[0.5,1.0]]}}})",
-       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"ellipse","center":[0.0,0.1],"half_axes":[1.0,0.3]}}})",
+       R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"ellipse","center":[0.0,0.1],"half_axes":[1.0,0.3]},"visible":true}})",
        R"({"mode":"add","shape":{"type":"screen","view":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0,-1.0,5.0],"outline":{"type":"polyline","vertices":[[0.0,0.1]],"width":0.3}},"steal":true})",
        R"({"mode":"flood","seed":[0.1,0.0,2.0],"angle_deg":33.3,"radius":0.5,"stop_at_other":true,"steal":true})",
        R"({"mode":"flood","seed":[0.1,0.0,2.0]})", R"({"mode":"invert","steal":true})", R"({"mode":"clear"})",

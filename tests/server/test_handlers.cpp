@@ -13,8 +13,10 @@
 #include "protocol/frames/stream_record.h"
 #include "server/handlers/openapi.h"
 #include "server/handlers/service.h"
+#include "server/ingest/png_reader.h"
 #include "server/routes/routes.h"
 #include "tests/server/synthetic.h"
+#include "tests/support/png_file.h"
 
 using namespace pointwright;
 using namespace pointwright::server;
@@ -45,6 +47,7 @@ struct TestService {
       : service(std::move(config),
                 {.decode = [](std::span<const std::byte> bytes, CloudFormat format,
                               const ImportParams& params) { return decode_cloud(bytes, format, params); },
+                 .decode_image = [](std::span<const std::byte> bytes) { return read_png(bytes, {}); },
                  .build = build_hierarchy,
                  .assets = {}}) {}
 
@@ -135,7 +138,7 @@ TEST_CASE("every route is in the API's description, and everything described has
   for (const auto& [path, operations] : openapi["paths"].items()) {
     if (path == "/assets/{file}") continue;  // answered from the table of files
     std::string pattern = path;
-    for (const char* name : {"{cloud}", "{session}"})
+    for (const char* name : {"{cloud}", "{image}", "{session}"})
       if (const std::size_t at = pattern.find(name); at != std::string::npos)
         pattern.replace(at, std::strlen(name), "{id}");
     for (const auto& [method, operation] : operations.items())

@@ -1,65 +1,22 @@
 // The demonstration: turns the Stanford dragon's head through the public HTTP API, checks the result against what was
 // asked for, and takes pictures with the real viewer. `make demo` builds what it needs and runs it.
-import { spawn } from "node:child_process";
 import { mkdirSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
-import { dirname, relative, resolve } from "node:path";
-import { fileURLToPath } from "node:url";
-import { putBeside } from "./beside.mjs";
+import { resolve } from "node:path";
+import { call, demand, here, openSession, root, say, step, takePicture, upload } from "./api.mjs";
+import { putTogether } from "./beside.mjs";
 import { startDaemon } from "./daemon.mjs";
 import { oneOperations, regionOf, turn, zeroOperations } from "./dragon.mjs";
 import { readPly } from "./ply.mjs";
 import { fitRigidMotion } from "./rigid.mjs";
 
-const root = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
 const out = resolve(root, "build/demo");
 const dragon = resolve(root, "build/data/dragon.drc");
 const angleDeg = 40;
 const previewCount = 12;
 const camera = { position: [-0.045, 0.165, 0.285], target: [-0.006, 0.124, 0], up: [0, 1, 0] };
 
-const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
-const here = (path) => relative(process.cwd(), path);
-const say = (label, ms, detail) =>
-  console.log(`  ${label.padEnd(30)} ${(ms / 1000).toFixed(2).padStart(7)} s   ${detail}`);
-/** Runs one step and prints its line; `work` answers what to say about it, or [what to say, the step's result]. */
-async function step(label, work) {
-  const start = performance.now();
-  const answer = await work();
-  const [detail, result] = Array.isArray(answer) ? answer : [answer];
-  say(label, performance.now() - start, detail);
-  return result;
-}
-function demand(condition, reason) {
-  if (!condition) throw new Error(reason);
-}
 const megabytes = (bytes) => `${(bytes / 1e6).toFixed(1)} MB`;
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
-
-/** A request to the API; anything but success is an error with the problem document's own words. */
-async function call(url, method, path, { json, body, headers = {} } = {}) {
-  const response = await fetch(url + path, {
-    method,
-    headers: { ...(json ? { "Content-Type": "application/json" } : {}), ...headers },
-    body: json ? JSON.stringify(json) : body,
-  });
-  if (!response.ok) {
-    const text = await response.text();
-    throw new Error(`${method} ${path} answered ${response.status}: ${text.slice(0, 2000)}`);
-  }
-  return response;
-}
-
-async function waitUntilReady(url, session) {
-  for (;;) {
-    const document = await (await call(url, "GET", session)).json();
-    if (document.state === "ready") return document;
-    demand(
-      document.state === "building",
-      `the session failed: ${JSON.stringify(document.error ?? document)}`,
-    );
-    await sleep(20);
-  }
-}
 
 /** One preview as a tool asks for it: the parameters go, the exact frame comes back. Answers its milliseconds and bytes. */
 async function preview(url, session, sequence, revision) {
@@ -73,25 +30,6 @@ async function preview(url, session, sequence, revision) {
   demand(Number(frame.readBigUInt64LE(16)) === revision, "the frame shows another revision");
   demand(Number(frame.readBigUInt64LE(24)) === sequence, "the frame shows another preview");
   return { ms, bytes: frame.length };
-}
-
-function takePicture(url, sessionId, name, mode) {
-  const file = resolve(out, name);
-  const args = ["web/scripts/pictures.mjs", "--url", url, "--session", sessionId, "--out", file];
-  args.push("--camera", JSON.stringify(camera), "--mode", mode, "--size", "1280x800", "--ui", "0");
-  return new Promise((done, fail) => {
-    const child = spawn(process.execPath, args, { cwd: root, stdio: ["ignore", "pipe", "pipe"] });
-    const endWithUs = () => child.kill();
-    process.once("exit", endWithUs);
-    child.on("close", () => process.off("exit", endWithUs));
-    let text = "";
-    child.stdout.on("data", (chunk) => (text += chunk));
-    child.stderr.on("data", (chunk) => (text += chunk));
-    child.on("error", fail);
-    child.on("close", (status) =>
-      status === 0 ? done(here(file)) : fail(new Error(`no picture ${name} (status ${status}):\n${text}`)),
-    );
-  });
 }
 
 /** Compares the download with the upload. Answers what to say; throws where the edit is not the one that was asked for. */
@@ -140,26 +78,19 @@ function verify(before, after, diagonal) {
 async function tell(url) {
   const drc = readFileSync(dragon);
   const cloud = await step("upload the scan", async () => {
-    const headers = { "Content-Type": "model/x-draco" };
-    const document = await (
-      await call(url, "POST", "/v1/clouds?name=Stanford%20dragon", { body: drc, headers })
-    ).json();
+    const document = await upload(url, "Stanford dragon", "model/x-draco", drc);
     return [`${document.sample_count} samples, ${megabytes(drc.length)} of Draco`, document];
   });
   const session = await step("split shape and detail", async () => {
-    const response = await call(url, "POST", "/v1/sessions", {
-      json: { cloud: cloud.id, name: "Demo", scales: [0.02, 0.01, 0.005] },
-    });
-    const path = response.headers.get("location");
-    demand(response.status === 202 && path, "POST /v1/sessions did not answer 202 with a Location");
-    const document = await waitUntilReady(url, path);
+    const document = await openSession(url, { cloud: cloud.id, name: "Demo", scales: [0.02, 0.01, 0.005] });
     const share = (band) => `${((100 * band.max_detail) / document.diagonal).toFixed(2)} %`;
     return [
       `${document.decomposition.length} bands, details up to ${document.decomposition.map(share).join(", ")} of the diagonal`,
-      { path, ...document },
+      document,
     ];
   });
-  await step("picture: before", () => takePicture(url, session.id, "before.png", "shaded"));
+  const picture = (name, mode) => takePicture(url, session.id, resolve(out, name), { camera, mode });
+  await step("picture: before", () => picture("before.png", "shaded"));
 
   await step("paint what stays", async () => {
     const response = await call(url, "PUT", `${session.path}/regions/zero`, {
@@ -176,7 +107,7 @@ async function tell(url) {
     }
     return [`${document.regions.one.samples} samples`, document.revision];
   });
-  await step("picture: painted", () => takePicture(url, session.id, "painted.png", "regions"));
+  await step("picture: painted", () => picture("painted.png", "regions"));
 
   await step("drag the head", async () => {
     const frames = [];
@@ -206,10 +137,10 @@ async function tell(url) {
     const original = await download(`/v1/clouds/${cloud.id}/data?format=ply`);
     return verify(readPly(original), readPly(edited), cloud.diagonal);
   });
-  await step("picture: after", () => takePicture(url, session.id, "after.png", "shaded"));
+  await step("picture: after", () => picture("after.png", "shaded"));
   await step("picture: both", async () => {
     const file = resolve(out, "dragon.jpg");
-    await putBeside(resolve(out, "painted.png"), resolve(out, "after.png"), 1280 / 800, file);
+    await putTogether([[resolve(out, "painted.png"), resolve(out, "after.png")]], 1280 / 800, file);
     return here(file);
   });
 }

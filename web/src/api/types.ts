@@ -52,13 +52,7 @@ export interface ImageShape {
 }
 export type ImageChannel = "luminance" | "red" | "green" | "blue" | "alpha";
 
-export interface ImageDocument {
-  id: string;
-  width: number;
-  height: number;
-  channels: number;
-  bytes: number;
-}
+export type ImageDocument = Schemas["Image"];
 
 /** What is within a distance of another cloud, placed by a matrix (row after row). */
 export interface ModelShape {

@@ -202,6 +202,70 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/images": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** All images */
+        get: operations["listImages"];
+        put?: never;
+        /**
+         * Upload an image to paint with
+         * @description The body is a PNG file of any kind: 1 to 16 bits, grey, palette or colours, with transparency or without, interlaced
+         *     or not. Values count as they are stored; no gamma or colour profile is applied.
+         */
+        post: operations["uploadImage"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/images/{image}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                image: components["parameters"]["ImageId"];
+            };
+            cookie?: never;
+        };
+        /** One image */
+        get: operations["getImage"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete an image
+         * @description What was painted with it stays painted.
+         */
+        delete: operations["deleteImage"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/images/{image}/data": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                image: components["parameters"]["ImageId"];
+            };
+            cookie?: never;
+        };
+        /** The file as it was uploaded */
+        get: operations["getImageData"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sessions": {
         parameters: {
             query?: never;
@@ -471,6 +535,21 @@ export interface components {
         CloudList: {
             clouds: components["schemas"]["Cloud"][];
         };
+        Image: {
+            id: components["schemas"]["Id"];
+            /** @description Pixels */
+            width: number;
+            /** @description Pixels */
+            height: number;
+            /** @description Those that the file has; palettes are colours */
+            channels: ("grey" | "red" | "green" | "blue" | "alpha")[];
+            /** @description Of the upload */
+            bytes: components["schemas"]["Count"];
+            created: components["schemas"]["Time"];
+        };
+        ImageList: {
+            images: components["schemas"]["Image"][];
+        };
         CreateSession: {
             cloud: components["schemas"]["Id"];
             name?: components["schemas"]["Name"];
@@ -564,7 +643,7 @@ export interface components {
             /** @description Samples that changed their mark */
             changed: components["schemas"]["Count"];
         };
-        Shape: components["schemas"]["SphereShape"] | components["schemas"]["StrokeShape"] | components["schemas"]["BoxShape"] | components["schemas"]["HalfSpaceShape"] | components["schemas"]["AllShape"] | components["schemas"]["PointsShape"] | components["schemas"]["ScreenShape"];
+        Shape: components["schemas"]["SphereShape"] | components["schemas"]["StrokeShape"] | components["schemas"]["BoxShape"] | components["schemas"]["HalfSpaceShape"] | components["schemas"]["AllShape"] | components["schemas"]["PointsShape"] | components["schemas"]["ScreenShape"] | components["schemas"]["ImageShape"] | components["schemas"]["ModelShape"];
         SphereShape: {
             /** @constant */
             type: "sphere";
@@ -614,6 +693,75 @@ export interface components {
             /** @description Model to clip space, row after row: clip = view * (x, y, z, 1); shown where clip w > 0 */
             view: number[];
             outline: components["schemas"]["PolygonOutline"] | components["schemas"]["EllipseOutline"] | components["schemas"]["PolylineOutline"];
+            /**
+             * @description Only samples that the view does not hide behind others: each is a disc as large as its spacing, and hides
+             *     what lies two radii and more behind it. Both sides of a surface are seen. Samples outside the view's depth
+             *     range (clip |z| > w) are neither seen nor hide others; in a parallel view depth grows with clip z
+             * @default false
+             */
+            visible: boolean;
+        };
+        /**
+         * @description Everything whose value in an image is on one side of a threshold. Values are bilinear between the middles of
+         *     pixels. Colours count by their alpha, and a place that is more than half transparent is outside on both sides,
+         *     unless alpha is the channel. Grey images give their grey for every colour; without an alpha channel alpha is 1.
+         *     The painting keeps what it painted: the image may be deleted afterwards
+         */
+        ImageShape: {
+            /** @constant */
+            type: "image";
+            image: components["schemas"]["Id"];
+            /**
+             * @description luminance is 0.2126 red + 0.7152 green + 0.0722 blue of the stored values, 0 to 1
+             * @default luminance
+             * @enum {string}
+             */
+            channel: "luminance" | "red" | "green" | "blue" | "alpha";
+            /** @default 0.5 */
+            threshold: number;
+            /**
+             * @description above: values of at least the threshold; below: all others
+             * @default above
+             * @enum {string}
+             */
+            side: "above" | "below";
+            projection: components["schemas"]["TextureProjection"] | components["schemas"]["PlanarProjection"];
+        };
+        /**
+         * @description By the samples' texture coordinates, which the cloud must have: (0, 0) is the image's lower left corner, (1, 1) its
+         *     upper right. Without `repeat`, what is beyond them is outside; with it, they count modulo 1
+         */
+        TextureProjection: {
+            /** @constant */
+            type: "texture";
+            /** @default false */
+            repeat: boolean;
+        };
+        /**
+         * @description Laid on a plane: `origin` is the image's lower left corner, `u` its whole width and `v` its whole height, neither
+         *     zero nor parallel. It paints through space along the plane's normal, or as far as `depth` says
+         */
+        PlanarProjection: {
+            /** @constant */
+            type: "planar";
+            origin: components["schemas"]["Vector"];
+            u: components["schemas"]["Vector"];
+            v: components["schemas"]["Vector"];
+            /** @description Nearest and farthest distance from the plane along u x v, in model units */
+            depth?: number[];
+        };
+        /**
+         * @description Everything within `thickness` of a sample of another cloud (or of the same one), once the matrix has moved it. The
+         *     painting keeps what it painted: the cloud may be deleted afterwards
+         */
+        ModelShape: {
+            /** @constant */
+            type: "model";
+            cloud: components["schemas"]["Id"];
+            /** @description Row after row: place = matrix * (x, y, z, 1). Affine (the last row is 0, 0, 0, 1) and not singular */
+            matrix: number[];
+            /** @description Model units of the session's cloud */
+            thickness: number;
         };
         ScreenPoint: number[];
         /** @description A lasso, closed by itself; inside is where it turns around a point an odd number of times */
@@ -635,6 +783,12 @@ export interface components {
             vertices: components["schemas"]["ScreenPoint"][];
             width: number;
         };
+        /**
+         * @description What depends on the sampling (flood, grow, shrink, `facing`, `visible`) acts on the samples at once and is
+         *     recorded as its outcome in model space: as point sets around the samples that it covered, or as the shape alone
+         *     where `facing` and `visible` kept nothing out. A painting holds no such operation, so that it gives the same
+         *     selection again, and on another sampling the same part of the surface
+         */
         PaintOperation: components["schemas"]["ShapeOperation"] | components["schemas"]["MembershipOperation"] | components["schemas"]["DistanceOperation"] | components["schemas"]["FloodOperation"];
         ShapeOperation: {
             /**
@@ -925,6 +1079,7 @@ export interface components {
     };
     parameters: {
         CloudId: components["schemas"]["Id"];
+        ImageId: components["schemas"]["Id"];
         SessionId: components["schemas"]["Id"];
         /** @description zero stays where it is, one moves in full */
         Region: "zero" | "one";
@@ -1271,6 +1426,139 @@ export interface operations {
             default: components["responses"]["Problem"];
         };
     };
+    listImages: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The images */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImageList"];
+                };
+            };
+            default: components["responses"]["Problem"];
+        };
+    };
+    uploadImage: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "image/png": string;
+            };
+        };
+        responses: {
+            /** @description Stored */
+            201: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    Location: components["headers"]["Location"];
+                    ETag: components["headers"]["ETag"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Image"];
+                };
+            };
+            400: components["responses"]["Problem"];
+            408: components["responses"]["Problem"];
+            411: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            429: components["responses"]["Busy"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    getImage: {
+        parameters: {
+            query?: never;
+            header?: {
+                "If-None-Match"?: components["parameters"]["IfNoneMatch"];
+            };
+            path: {
+                image: components["parameters"]["ImageId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The image */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    ETag: components["headers"]["ETag"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Image"];
+                };
+            };
+            304: components["responses"]["NotModified"];
+            404: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    deleteImage: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                image: components["parameters"]["ImageId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            204: components["responses"]["Done"];
+            404: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    getImageData: {
+        parameters: {
+            query?: never;
+            header?: {
+                "If-None-Match"?: components["parameters"]["IfNoneMatch"];
+            };
+            path: {
+                image: components["parameters"]["ImageId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The file */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    ETag: components["headers"]["ETag"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/png": string;
+                };
+            };
+            304: components["responses"]["NotModified"];
+            404: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
     listSessions: {
         parameters: {
             query?: never;
@@ -1377,7 +1665,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description The operations that made it */
+            /** @description The operations that make it, as they are recorded */
             200: {
                 headers: {
                     "X-Request-Id": components["headers"]["RequestId"];

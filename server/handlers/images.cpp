@@ -1,0 +1,61 @@
+#include "server/handlers/handlers.h"
+#include "server/handlers/query.h"
+
+namespace pointwright::server {
+namespace {
+
+constexpr std::string_view kMediaType = "image/png";
+
+Response not_found(const Request& request) {
+  return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such image"}, request);
+}
+
+std::string content_tag(const StoredImage& image) {
+  return etag_of({image.sha256});
+}
+
+}  // namespace
+
+Response list_images(Service& service, const Request&) {
+  std::vector<protocol::ImageDocument> documents;
+  for (const SharedImage& image : service.images.list()) documents.push_back(image->document);
+  return json_response(protocol::image_list(documents));
+}
+
+Response upload_image(Service& service, const Request& request) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto image = service.images.add(service.decode_image, request.body_bytes());
+  if (!image.ok()) return problem_response(image.problem(), request);
+  Response response = json_response(protocol::to_json(image.value()->document), 201);
+  response.timings.emplace_back(
+      "decode", std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+  return response.with_header("Location", "/v1/images/" + image.value()->document.id)
+      .with_header("ETag", content_tag(*image.value()));
+}
+
+Response get_image(Service& service, const Request& request) {
+  const SharedImage image = service.images.find(request.captures.at(0));
+  if (image == nullptr) return not_found(request);
+  if (is_unchanged(request.head, content_tag(*image))) return not_modified(content_tag(*image));
+  return json_response(protocol::to_json(image->document)).with_header("ETag", content_tag(*image));
+}
+
+Response get_image_data(Service& service, const Request& request) {
+  const SharedImage image = service.images.find(request.captures.at(0));
+  if (image == nullptr) return not_found(request);
+  const std::string etag = etag_of({image->sha256, "data"});
+  if (is_unchanged(request.head, etag)) return not_modified(etag);
+  Response response{
+      .content_type = std::string(kMediaType),
+      .body = SharedBytes{.owner = image,
+                          .bytes = std::as_bytes(std::span(image->file.data(), image->file.size()))}};
+  return response.with_header("ETag", etag);
+}
+
+Response delete_image(Service& service, const Request& request) {
+  if (auto removed = service.images.remove(request.captures.at(0)); !removed.ok())
+    return problem_response(removed.problem(), request);
+  return {.status = 204};
+}
+
+}  // namespace pointwright::server
