@@ -21,7 +21,7 @@ const CHANNELS: readonly (readonly [ImageChannel, string])[] = [
 ];
 const PREVIEW_PX = 240;
 /** How the cloud's import report names coordinates of a texture. */
-const TEXTURE_ATTRIBUTE = /tex|^uv|^st$/i;
+const TEXTURE_ATTRIBUTE = "texcoord";
 
 type Use = "both" | "zero-below" | "zero-above" | "one-above" | "one-below";
 const USES: readonly (readonly [Use, string])[] = [
@@ -167,7 +167,7 @@ export function createImageForm(
     .clouds()
     .then((clouds) => {
       const cloud = clouds.find(({ id }) => id === store.document.cloud);
-      way.element.hidden = !cloud?.report.attributes.some((attribute) => TEXTURE_ATTRIBUTE.test(attribute));
+      way.element.hidden = !cloud?.report.attributes.includes(TEXTURE_ATTRIBUTE);
     })
     // Without the list there is the view to place it by.
     .catch(() => undefined);

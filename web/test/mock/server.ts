@@ -150,7 +150,13 @@ createServer((request, response) => {
     return void handleSession(request, response, parts.slice(3), url.searchParams);
   if (parts[1] === "images" && request.method === "POST") {
     request.resume();
-    const image = { id: "mockimage0000000000001", width: 256, height: 128, channels: 4, bytes: 1024 };
+    const image = {
+      id: "mockimage0000000000001",
+      width: 256,
+      height: 128,
+      channels: ["red", "green", "blue", "alpha"],
+      bytes: 1024,
+    };
     return json(response, 201, image);
   }
   if (parts[1] === "clouds" && request.method === "GET") return json(response, 200, { clouds: [cloud] });
