@@ -127,7 +127,7 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, Expected e
     history_->push(record, computed.value());
 
     Document after = *document();  // with the levels that computing may have derived
-    after.surface = computed.value();
+    after.surface = history_->current();
     after.edits = std::make_shared<const EditList>(history_->edits());
     after.head = history_->head();
     after.bounds = model_bounds(after.surface.surface->finest().position, params_.cloud->origin);

@@ -12,5 +12,6 @@ void bench_smoothing(BenchReport& report);
 void bench_editing(BenchReport& report);
 void bench_frames(BenchReport& report);
 void bench_session(BenchReport& report);
+void bench_undo(BenchReport& report);
 
 }  // namespace pointwright::bench

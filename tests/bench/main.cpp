@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
     pointwright::bench::bench_editing(report);
     pointwright::bench::bench_frames(report);
     pointwright::bench::bench_session(report);
+    pointwright::bench::bench_undo(report);
   });
   if (!report.write_json(out)) {
     std::fprintf(stderr, "cannot write %s\n", out.c_str());
