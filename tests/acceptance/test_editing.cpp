@@ -6,39 +6,18 @@
 #include <set>
 #include <thread>
 
-#include "engine/io/cloud_io.h"
 #include "protocol/frames/frame.h"
 #include "protocol/frames/stream_record.h"
 #include "server/ingest/sandbox.h"
+#include "tests/acceptance/bodies.h"
 #include "tests/acceptance/daemon.h"
 #include "tests/server/raw_client.h"
-#include "tests/server/synthetic.h"
 
 using namespace pointwright;
 using namespace pointwright::test;
 using nlohmann::json;
 
 namespace {
-
-const std::string kLeft = R"({"mode":"add","shape":{"type":"box","min":[-1,-1,-1],"max":[0.2,2,1]}})";
-const std::string kRight = R"({"mode":"add","shape":{"type":"box","min":[0.8,-1,-1],"max":[2,2,1]}})";
-
-std::string translation(double z, const std::string& more = "") {
-  return R"({"level":0,"blend":"quartic","deformation":{"type":"translation","vector":[0,0,)" +
-         std::to_string(z) + "]}" + more + "}";
-}
-
-std::string file_of(const Cloud& cloud, CloudFormat format = CloudFormat::kPly) {
-  const auto file = write_cloud(cloud, format, {});
-  REQUIRE(file.ok());
-  return {reinterpret_cast<const char*>(file.value().data()), file.value().size()};
-}
-
-Cloud cloud_of(const std::string& bytes) {
-  auto read = read_cloud(std::as_bytes(std::span(bytes.data(), bytes.size())), CloudFormat::kPly, {});
-  REQUIRE(read.ok());
-  return in_caller_order(read.value().cloud);
-}
 
 /// Reads a stream's records from a connection.
 class StreamReader {
