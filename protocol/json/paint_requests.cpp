@@ -338,10 +338,9 @@ Parsed<PaintOperation> parse_paint_operation(const Json& document) {
   return value_or_errors(std::move(operation), std::move(errors));
 }
 
-Parsed<std::vector<PaintOperation>> parse_painting(const Json& document) {
-  JsonErrors errors;
+std::vector<PaintOperation> read_operations(ObjectReader& object) {
   std::vector<PaintOperation> painting;
-  ObjectReader object(document, "", errors);
+  JsonErrors& errors = object.errors();
   if (const Json* const member = object.required("operations")) {
     const std::string pointer = object.pointer_to("operations");
     if (const Json* const array = read_array(*member, pointer, errors, 0, kMaxPaintOperations)) {
@@ -351,6 +350,13 @@ Parsed<std::vector<PaintOperation>> parse_painting(const Json& document) {
       }
     }
   }
+  return painting;
+}
+
+Parsed<std::vector<PaintOperation>> parse_painting(const Json& document) {
+  JsonErrors errors;
+  ObjectReader object(document, "", errors);
+  std::vector<PaintOperation> painting = read_operations(object);
   object.finish();
   return value_or_errors(std::move(painting), std::move(errors));
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "engine/core/result.h"
 #include "protocol/json/reader.h"
@@ -41,6 +42,12 @@ inline std::optional<std::size_t> required_choice(ObjectReader& object, std::str
   if (member == nullptr) return std::nullopt;
   return read_choice(*member, object.pointer_to(name), object.errors(), names);
 }
+
+/// The members of an edit, the engine's verdict included; the caller reads further ones and finishes the
+/// object.
+EditParams read_edit_members(ObjectReader& object);
+/// The required member "operations": those of one painting.
+std::vector<PaintOperation> read_operations(ObjectReader& object);
 
 /// Adds the engine's verdict where the document itself was in order.
 inline void add_verdict(const Result<void>& verdict, const std::string& pointer, JsonErrors& errors) {

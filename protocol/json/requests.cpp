@@ -98,7 +98,8 @@ Result<void> verdict_of(const Deformation& deformation, bool is_sequence) {
   return error;
 }
 
-/// Reads the members of an edit; the caller reads further ones and finishes the object.
+}  // namespace
+
 EditParams read_edit_members(ObjectReader& object) {
   JsonErrors& errors = object.errors();
   const std::size_t faults_before = errors.fault_count;
@@ -130,8 +131,6 @@ EditParams read_edit_members(ObjectReader& object) {
   }
   return edit;
 }
-
-}  // namespace
 
 Parsed<EditParams> parse_edit(const Json& document) {
   JsonErrors errors;

@@ -25,6 +25,7 @@ struct Limits {
   std::uint64_t max_operations = 10'000;
   std::uint64_t max_painting_vertices = 1'000'000;
   std::uint64_t max_json_bytes = 8ULL << 20U;
+  std::uint64_t max_recipe_bytes = 32ULL << 20U;
   std::uint64_t max_json_depth = 32;
   std::uint64_t max_connections = 1024;
   std::uint64_t max_streams = 64;

@@ -78,4 +78,13 @@ Outcome<Response> frame_answer(Service& service, const SharedFrame& frame) {
                   .body = SharedBytes{.owner = owner, .bytes = *frame}};
 }
 
+Outcome<Response> text_answer(Service& service, std::string text, std::string content_type) {
+  auto memory = service.answer_memory.hold_or_alone(text.size());
+  if (memory == nullptr) return no_room(service);
+  const auto owner = std::make_shared<const std::pair<std::string, std::shared_ptr<Budget::Hold>>>(
+      std::move(text), std::move(memory));
+  return Response{.content_type = std::move(content_type),
+                  .body = SharedBytes{.owner = owner, .bytes = std::as_bytes(std::span(owner->first))}};
+}
+
 }  // namespace pointwright::server

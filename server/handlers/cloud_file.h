@@ -1,5 +1,5 @@
 #pragma once
-// Clouds as files to download, and single frames.
+// Clouds as files to download, single frames and long texts.
 
 #include "server/handlers/query.h"
 #include "server/handlers/service.h"
@@ -27,5 +27,9 @@ Response cloud_file_response(Service& service, const Request& request,
 /// A frame as an answer that holds its part of the memory for answers until it is sent.
 /// Problem: overloaded
 Outcome<Response> frame_answer(Service& service, const SharedFrame& frame);
+
+/// A text as an answer that holds its part of the memory for answers until it is sent.
+/// Problem: overloaded
+Outcome<Response> text_answer(Service& service, std::string text, std::string content_type);
 
 }  // namespace pointwright::server

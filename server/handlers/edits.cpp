@@ -30,11 +30,7 @@ Response list_edits(Service& service, const Request& request) {
 Response post_edit(Service& service, const Request& request) {
   const auto session = session_of(service, request);
   if (!session.ok()) return problem_response(session.problem(), request);
-  if (!request.head.header("if-match"))
-    return problem_response({.kind = ProblemKind::kRevisionRequired,
-                             .detail = "name the revision to build on: If-Match: \"r<n>\""},
-                            request);
-  const auto revision = expected_revision(request.head);
+  const auto revision = required_revision(request.head);
   if (!revision.ok()) return problem_response(revision.problem(), request);
   const auto edit = parsed_body(service, request, protocol::parse_edit);
   if (!edit.ok()) return problem_response(edit.problem(), request);

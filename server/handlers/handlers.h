@@ -45,6 +45,9 @@ Response delete_preview(Service& service, const Request& request);
 Response list_edits(Service& service, const Request& request);
 Response post_edit(Service& service, const Request& request);
 Response put_head(Service& service, const Request& request);
+// recipe.cpp
+Response get_recipe(Service& service, const Request& request);
+Response post_recipe(Service& service, const Request& request);
 // samples.cpp
 Response get_samples(Service& service, const Request& request);
 // stream.cpp

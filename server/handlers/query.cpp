@@ -92,6 +92,29 @@ Outcome<std::optional<std::uint32_t>> query_number(const RequestHead& head, std:
   return std::optional<std::uint32_t>(value);
 }
 
+Outcome<std::optional<double>> query_fraction(const RequestHead& head, std::string_view name) {
+  const auto text = query_value(head, name);
+  if (!text) return std::optional<double>();
+  double value = 0.0;
+  const char* const stop = text->data() + text->size();
+  const auto [end, error] = std::from_chars(text->data(), stop, value);
+  if (error != std::errc{} || end != stop || !(value >= 0.0 && value <= 1.0))
+    return bad_parameter(std::string(name), "a number from 0 to 1 is expected");
+  return std::optional<double>(value + 0.0);  // -0 is 0
+}
+
+Outcome<std::optional<std::size_t>> query_choice(const RequestHead& head, std::string_view name,
+                                                 std::span<const std::string_view> names) {
+  const auto text = query_value(head, name);
+  if (!text) return std::optional<std::size_t>();
+  std::string list;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i] == *text) return std::optional<std::size_t>(i);
+    list += (list.empty() ? "" : ", ") + std::string(names[i]);
+  }
+  return bad_parameter(std::string(name), "it must be one of " + list);
+}
+
 Outcome<Format> negotiated_format(const RequestHead& head, const std::vector<Format>& formats) {
   if (const auto name = query_value(head, "format")) {
     for (const Format& format : formats)

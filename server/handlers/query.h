@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,12 @@ Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t a
 
 /// A whole number of at most 9 digits; nullopt where it is not given.
 Outcome<std::optional<std::uint32_t>> query_number(const RequestHead& head, std::string_view name);
+
+/// A number from 0 to 1; nullopt where it is not given.
+Outcome<std::optional<double>> query_fraction(const RequestHead& head, std::string_view name);
+/// Index of the parameter's text among `names`; nullopt where it is not given.
+Outcome<std::optional<std::size_t>> query_choice(const RequestHead& head, std::string_view name,
+                                                 std::span<const std::string_view> names);
 
 /// A representation that can be given: what ?format= calls it, and its media type.
 struct Format {

@@ -2,6 +2,7 @@
 #include "server/handlers/cloud_file.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/query.h"
+#include "server/sessions/recipes.h"
 
 namespace pointwright::server {
 namespace {
@@ -19,44 +20,81 @@ std::string revision_name(std::uint64_t revision) {
   return std::string(1, 'r').append(std::to_string(revision));
 }
 
-std::string frame_tag(std::uint64_t revision, std::uint32_t level, std::uint16_t attributes) {
-  return etag_of({revision_name(revision), "frame", std::to_string(level), std::to_string(attributes)});
+/// Which surface is asked for.
+struct View {
+  std::uint32_t level = 0;
+  std::optional<Play> play;  ///< none: all edits whole
+};
+
+/// "2", or "2-0.5-together".
+std::string view_name(const View& view) {
+  std::string name = std::to_string(view.level);
+  if (!view.play) return name;
+  return name.append("-")
+      .append(protocol::to_text(protocol::JsonDocument(view.play->s)))
+      .append("-")
+      .append(protocol::kTimingNames[static_cast<std::size_t>(view.play->timing)]);
 }
 
-Response frame_response(Service& service, const Request& request, Session& session, std::uint32_t level,
+std::string frame_tag(std::uint64_t revision, const View& view, std::uint16_t attributes) {
+  return etag_of({revision_name(revision), "frame", view_name(view), std::to_string(attributes)});
+}
+
+/// The committed surface; or its edits part of the way, which is the background's work: no hand waits for it.
+Outcome<Picture> picture_at(Service& service, Session& session, const View& view, bool with_t) {
+  if (!view.play) return session.committed_picture(view.level, with_t);
+  auto computing =
+      computed(service.background, [&] { return partial_picture(session, view.level, *view.play, with_t); });
+  if (!computing.ok()) return computing.problem();
+  return std::move(computing.value());
+}
+
+Response frame_response(Service& service, const Request& request, Session& session, const View& view,
                         std::uint16_t attributes) {
-  if (const std::string etag = frame_tag(session.document()->revision, level, attributes);
+  if (const std::string etag = frame_tag(session.document()->revision, view, attributes);
       is_unchanged(request.head, etag))
     return not_modified(etag);
-  const auto picture = session.committed_picture(level, (attributes & protocol::kFrameT) != 0);
+  const auto picture = picture_at(service, session, view, (attributes & protocol::kFrameT) != 0);
   if (!picture.ok()) return problem_response(picture.problem(), request);
   const auto frame = computed(service.interactive, [&] {
-    return encode_picture(session.display().layout(), picture.value(), session.cloud(), level, attributes);
+    return encode_picture(session.display().layout(), picture.value(), session.cloud(), view.level,
+                          attributes);
   });
   if (!frame.ok()) return problem_response(frame.problem(), request);
   auto answer = frame_answer(service, frame.value());
   if (!answer.ok()) return problem_response(answer.problem(), request);
   return answer.value()
-      .with_header("ETag", frame_tag(picture.value().revision, level, attributes))
+      .with_header("ETag", frame_tag(picture.value().revision, view, attributes))
       .with_header("Cache-Control", "no-cache")
       .with_header("Vary", "Accept");
 }
 
-std::string file_tag(std::uint64_t revision, const Format& format, std::uint32_t level) {
-  return etag_of({revision_name(revision), format.name, std::to_string(level)});
+std::string file_tag(std::uint64_t revision, const Format& format, const View& view) {
+  return etag_of({revision_name(revision), format.name, view_name(view)});
 }
 
-Response file_response(Service& service, const Request& request, Session& session, std::uint32_t level,
+Response file_response(Service& service, const Request& request, Session& session, const View& view,
                        const Format& format) {
-  if (const std::string etag = file_tag(session.document()->revision, format, level);
+  if (const std::string etag = file_tag(session.document()->revision, format, view);
       is_unchanged(request.head, etag))
     return not_modified(etag);
-  const auto picture = session.committed_picture(level, false);
+  const auto picture = picture_at(service, session, view, false);
   if (!picture.ok()) return problem_response(picture.problem(), request);
   return cloud_file_response(
-      service, request, [&] { return session.edited_cloud(picture.value(), level); },
+      service, request, [&] { return session.edited_cloud(picture.value(), view.level); },
       memory_of(session.cloud()),
-      {.format = format, .name = session.name(), .etag = file_tag(picture.value().revision, format, level)});
+      {.format = format, .name = session.name(), .etag = file_tag(picture.value().revision, format, view)});
+}
+
+/// ?s= and ?timing=; none where neither is given.
+Outcome<std::optional<Play>> query_play(const RequestHead& head) {
+  const auto s = query_fraction(head, "s");
+  if (!s.ok()) return s.problem();
+  const auto timing = query_choice(head, "timing", protocol::kTimingNames);
+  if (!timing.ok()) return timing.problem();
+  if (!s.value() && !timing.value()) return std::optional<Play>();
+  return std::optional<Play>(Play{.s = s.value().value_or(1.0),
+                                  .timing = static_cast<protocol::Timing>(timing.value().value_or(0))});
 }
 
 }  // namespace
@@ -64,12 +102,14 @@ Response file_response(Service& service, const Request& request, Session& sessio
 Response get_samples(Service& service, const Request& request) {
   const auto session = session_of(service, request);
   if (!session.ok()) return problem_response(session.problem(), request);
-  if (auto known = check_query(request.head, {"format", "level", "attributes"}); !known.ok())
+  if (auto known = check_query(request.head, {"format", "level", "attributes", "s", "timing"}); !known.ok())
     return problem_response(known.problem(), request);
   const auto format = negotiated_format(request.head, sample_formats());
   if (!format.ok()) return problem_response(format.problem(), request);
   const auto asked_level = query_number(request.head, "level");
   if (!asked_level.ok()) return problem_response(asked_level.problem(), request);
+  const auto play = query_play(request.head);
+  if (!play.ok()) return problem_response(play.problem(), request);
   const SharedDocument document = session.value()->document();
   if (document->state != protocol::SessionState::kReady)
     return problem_response({.kind = ProblemKind::kWrongState, .detail = "the session is not ready"},
@@ -83,11 +123,12 @@ Response get_samples(Service& service, const Request& request) {
                              .limit = finest,
                              .actual = level},
                             request);
+  const View view{.level = level, .play = play.value()};
   if (format.value().name == "frame") {
     const auto attributes =
         query_attributes(request.head, protocol::kAllFrameAttributes, protocol::kFrameNormal);
     if (!attributes.ok()) return problem_response(attributes.problem(), request);
-    return frame_response(service, request, *session.value(), level,
+    return frame_response(service, request, *session.value(), view,
                           session.value()->available_attributes(attributes.value()));
   }
   if (query_value(request.head, "attributes"))
@@ -95,7 +136,7 @@ Response get_samples(Service& service, const Request& request) {
                              .detail = "attributes can be chosen for frames only; files hold all of them",
                              .errors = {{.pointer = "?attributes", .detail = "for format=frame only"}}},
                             request);
-  return file_response(service, request, *session.value(), level, format.value());
+  return file_response(service, request, *session.value(), view, format.value());
 }
 
 }  // namespace pointwright::server

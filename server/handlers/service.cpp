@@ -63,6 +63,27 @@ Outcome<Session::Expected> expected_revision(const RequestHead& head) {
                  .detail = "If-Match must be one strong tag \"r<n>\", or *"};
 }
 
+Outcome<Session::Expected> required_revision(const RequestHead& head) {
+  if (head.header("if-match")) return expected_revision(head);
+  return Problem{.kind = ProblemKind::kRevisionRequired,
+                 .detail = "name the revision to build on: If-Match: \"r<n>\""};
+}
+
+protocol::ParseLimits json_limits(const Service& service) {
+  return {.max_bytes = static_cast<std::size_t>(service.config.limits.max_json_bytes),
+          .max_depth = static_cast<std::size_t>(service.config.limits.max_json_depth)};
+}
+
+protocol::ParseLimits recipe_limits(const Service& service) {
+  // Most of a recipe are numbers with many digits: this is more values than any such text holds, and in
+  // proportion to its bytes no more than an ordinary document may have.
+  constexpr std::uint64_t kBytesPerValue = 8;
+  protocol::ParseLimits limits = json_limits(service);
+  limits.max_bytes = static_cast<std::size_t>(service.config.limits.max_recipe_bytes);
+  limits.max_values = std::max(limits.max_values, limits.max_bytes / kBytesPerValue);
+  return limits;
+}
+
 Response session_response(const Session& session, const Document& document, int status) {
   return json_response(protocol::to_json(session.describe(document)), status)
       .with_header("ETag", revision_tag(document.revision));

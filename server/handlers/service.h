@@ -61,22 +61,31 @@ Outcome<std::shared_ptr<Session>> session_of(Service& service, const Request& re
 /// The revision that If-Match names: "r<number>"; none where it is absent or *.
 Outcome<Session::Expected> expected_revision(const RequestHead& head);
 
+/// The same where the change must name a revision. Problem besides: revision required
+Outcome<Session::Expected> required_revision(const RequestHead& head);
+
 /// The session document with its ETag.
 Response session_response(const Session& session, const Document& document, int status = 200);
 std::string revision_tag(std::uint64_t revision);
 
+/// What parsers accept of an ordinary document; of a recipe.
+protocol::ParseLimits json_limits(const Service& service);
+protocol::ParseLimits recipe_limits(const Service& service);
+
 /// Parses the body with one of the protocol's parsers, within the limits.
 template <typename T>
-Outcome<T> parsed_body(const Service& service, const Request& request,
-                       protocol::Parsed<T> (*parse)(const protocol::Json&)) {
+Outcome<T> parsed_body(const Request& request, protocol::Parsed<T> (*parse)(const protocol::Json&),
+                       const protocol::ParseLimits& limits) {
   if (request.body.empty())
     return Problem{.kind = ProblemKind::kEmptyBody, .detail = "this request needs a JSON body"};
-  const protocol::ParseLimits limits{
-      .max_bytes = static_cast<std::size_t>(service.config.limits.max_json_bytes),
-      .max_depth = static_cast<std::size_t>(service.config.limits.max_json_depth)};
   auto parsed = protocol::parse_body(request.body, limits, parse);
   if (!parsed) return protocol::to_problem(parsed.errors());
   return std::move(parsed).value();
+}
+template <typename T>
+Outcome<T> parsed_body(const Service& service, const Request& request,
+                       protocol::Parsed<T> (*parse)(const protocol::Json&)) {
+  return parsed_body(request, parse, json_limits(service));
 }
 
 }  // namespace pointwright::server

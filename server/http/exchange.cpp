@@ -109,7 +109,8 @@ std::optional<Problem> Exchange::check_body(const BodyPolicy& policy) const {
                    .actual = static_cast<double>(length)};
   }
   const std::string type = head.media_type();
-  if (policy.kind == BodyPolicy::Kind::kJson && type != "application/json")
+  const bool is_json = policy.kind == BodyPolicy::Kind::kJson || policy.kind == BodyPolicy::Kind::kRecipe;
+  if (is_json && type != "application/json")
     return Problem{.kind = ProblemKind::kUnsupportedMediaType, .detail = "send application/json"};
   if (policy.kind == BodyPolicy::Kind::kCloud && type != "model/x-draco" && type != "application/x-ply" &&
       type != "text/plain" && type != "application/octet-stream")

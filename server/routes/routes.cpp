@@ -43,6 +43,8 @@ constexpr std::array kRoutes = {
     Route{kGet, "/v1/sessions/{id}/edits", Body::kNone, list_edits},
     Route{kPost, "/v1/sessions/{id}/edits", Body::kJson, post_edit},
     Route{kPut, "/v1/sessions/{id}/head", Body::kJson, put_head},
+    Route{kGet, "/v1/sessions/{id}/recipe", Body::kNone, get_recipe},
+    Route{kPost, "/v1/sessions/{id}/recipe", Body::kRecipe, post_recipe},
     Route{kGet, "/v1/sessions/{id}/samples", Body::kNone, get_samples},
     Route{kGet, "/v1/sessions/{id}/stream", Body::kNone, get_stream},
 };
@@ -65,6 +67,8 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
       return {.kind = route.body, .max_bytes = 0};
     case Body::kJson:
       return {.kind = route.body, .max_bytes = limits.max_json_bytes};
+    case Body::kRecipe:
+      return {.kind = route.body, .max_bytes = limits.max_recipe_bytes};
     case Body::kCloud:
       return {.kind = route.body, .max_bytes = limits.max_upload_bytes};
     case Body::kImage:

@@ -92,10 +92,13 @@ void Session::finish_building(Result<Hierarchy> built) {
       .surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
       .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),
       .first_valid_level = 0};
-  history_.emplace(state, params_.history_bytes,
-                   [this](const SurfaceState& before, const RecordedEdit& record) {
-                     return replayed(rest_, before, record, context_);
-                   });
+  history_.emplace(
+      state, params_.history_bytes,
+      History::Work{
+          .replay = [this](const SurfaceState& before,
+                           const RecordedEdit& record) { return replayed(rest_, before, record, context_); },
+          .derive =
+              [this](const SurfaceState& stale) { return with_valid_level(rest_, stale, 0, context_); }});
   document.state = protocol::SessionState::kReady;
   document.surface = std::move(state);
   document.marks = std::make_shared<const Marks>(params_.cloud->size(), std::uint8_t{0});

@@ -10,33 +10,13 @@
 #include <string>
 
 #include "server/base/outcome.h"
-#include "server/sessions/compute_pool.h"
 #include "server/sessions/display.h"
 #include "server/sessions/document.h"
 #include "server/sessions/drag.h"
 #include "server/sessions/feed.h"
+#include "server/sessions/session_params.h"
 
 namespace pointwright::server {
-
-/// What a session is made from.
-struct SessionParams {
-  std::string id;
-  std::string name;
-  std::string cloud_id;
-  std::shared_ptr<const Cloud> cloud;
-  HierarchyParams hierarchy;
-  std::uint64_t history_bytes = 0;
-  std::size_t max_edits = 0;
-  std::size_t max_operations = 0;
-  std::size_t max_painting_vertices = 1'000'000;
-};
-
-/// What a session computes with: `background` for what lasts for seconds, `interactive` for a waiting hand.
-struct SessionServices {
-  ComputePool& interactive;
-  ComputePool& background;
-  HierarchyBuilder build;
-};
 
 /// All public methods are thread-safe. Changes run one after the other on the session's strand, and the
 /// methods that ask for them block until they are done: HTTP threads call them. Readers take the newest
@@ -50,6 +30,11 @@ class Session : public std::enable_shared_from_this<Session> {
   [[nodiscard]] const std::string& name() const { return params_.name; }
   [[nodiscard]] const std::string& cloud_id() const { return params_.cloud_id; }
   [[nodiscard]] const Cloud& cloud() const { return *params_.cloud; }
+  [[nodiscard]] const SessionParams& params() const { return params_; }
+  /// Pre: the session is ready
+  [[nodiscard]] const RestModel& rest() const { return rest_; }
+  /// Cancelled when the session is closed.
+  [[nodiscard]] const ExecutionContext& context() const { return context_; }
   [[nodiscard]] SharedDocument document() const;
   [[nodiscard]] protocol::SessionDocument describe(const Document& document) const;
   [[nodiscard]] Progress progress() const { return context_.progress(); }
@@ -85,8 +70,25 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Undo, redo, jump: keeps the first `edit` edits applied.
   Outcome<SharedDocument> move_head(std::size_t edit, Expected expected = {});
 
+  /// The history as it stands, to go on from beside the session, and the document that it belongs to.
+  struct Fork {
+    SharedDocument document;
+    History history;
+  };
+  /// Problems: wrong state, a stale revision
+  Outcome<Fork> fork(Expected expected);
+  /// Puts a fork's history, the regions and the marks of its document in place of the session's own: one
+  /// change. Problem: a stale revision where the session has changed since it was forked.
+  Outcome<SharedDocument> adopt(Fork fork);
+  /// The last state up to `edit` edits of the list that the history knows without replaying anything.
+  /// Pre: the list was the session's at some time
+  Outcome<History::Known> known_state(const EditList& edits, std::size_t edit);
+
   /// The committed state with `level` valid; with t where the regions allow it.
   Outcome<Picture> committed_picture(std::uint32_t level, bool with_t);
+  /// What viewers see of a state: the committed one, or a preview's (sequence > 0).
+  [[nodiscard]] Picture picture_of(const Document& now, const SurfaceState& state,
+                                   std::shared_ptr<const ScaleField> field, std::uint64_t sequence) const;
   /// The cloud as edited: the upload's columns in coherent order, moved samples at their new places on
   /// `level` of the picture. Cost: a copy of the cloud.
   [[nodiscard]] std::shared_ptr<const Cloud> edited_cloud(const Picture& picture, std::uint32_t level) const;
@@ -119,9 +121,6 @@ class Session : public std::enable_shared_from_this<Session> {
   void finish_building(Result<Hierarchy> built);
   void fail(protocol::Problem problem);  // while building
   void publish(Document document);
-  /// What viewers see of a state: the committed one, or a preview's (sequence > 0).
-  [[nodiscard]] Picture picture_of(const Document& now, const SurfaceState& state, SharedField field,
-                                   std::uint64_t sequence) const;
   void show_committed();
   void run_preview();
   void schedule_field();

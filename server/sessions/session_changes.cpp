@@ -135,7 +135,7 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, Expected e
     history_->push(record, computed.value());
 
     Document after = *document();  // with the levels that computing may have derived
-    after.surface = computed.value();
+    after.surface = history_->current();
     after.edits = std::make_shared<const EditList>(history_->edits());
     after.head = history_->head();
     after.bounds = model_bounds(after.surface.surface->finest().position, params_.cloud->origin);
@@ -177,6 +177,48 @@ Outcome<SharedDocument> Session::move_head(std::size_t edit, Expected expected) 
     show_committed();
     schedule_field();
     return document();
+  });
+}
+
+Outcome<Session::Fork> Session::fork(Expected expected) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this]() -> Outcome<Fork> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    if (auto current = check_revision(expected); !current.ok()) return current.problem();
+    return Fork{.document = document(), .history = *history_};
+  });
+}
+
+Outcome<SharedDocument> Session::adopt(Fork fork) {
+  return on_strand([&, this]() -> Outcome<SharedDocument> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    if (auto current = check_revision(fork.document->revision); !current.ok()) return current.problem();
+    last_preview_.reset();
+    drag_.reset();  // the surface that it moved is the past
+    history_ = std::move(fork.history);
+    Document after = *fork.document;
+    after.surface = history_->current();
+    after.edits = std::make_shared<const EditList>(history_->edits());
+    after.head = history_->head();
+    after.bounds = model_bounds(after.surface.surface->finest().position, params_.cloud->origin);
+    ++after.revision;
+    publish(std::move(after));
+    end_drag();
+    show_committed();
+    schedule_field();
+    return document();
+  });
+}
+
+Outcome<History::Known> Session::known_state(const EditList& edits, std::size_t edit) {
+  return on_strand([&, this]() -> Outcome<History::Known> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    // Of edits that have been dropped meanwhile the states are gone; those before them are still shared.
+    const EditList& now = history_->edits();
+    std::size_t shared = 0;
+    while (shared < edit && shared < now.size() && now[shared] == edits[shared]) ++shared;
+    return history_->nearest_known(shared);
   });
 }
 

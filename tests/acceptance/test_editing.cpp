@@ -9,25 +9,16 @@
 #include "protocol/frames/frame.h"
 #include "protocol/frames/stream_record.h"
 #include "server/ingest/sandbox.h"
-#include "tests/acceptance/cloud_files.h"
+#include "tests/acceptance/bodies.h"
 #include "tests/acceptance/daemon.h"
 #include "tests/acceptance/stream_reader.h"
 #include "tests/server/raw_client.h"
-#include "tests/server/synthetic.h"
 
 using namespace pointwright;
 using namespace pointwright::test;
 using nlohmann::json;
 
 namespace {
-
-const std::string kLeft = R"({"mode":"add","shape":{"type":"box","min":[-1,-1,-1],"max":[0.2,2,1]}})";
-const std::string kRight = R"({"mode":"add","shape":{"type":"box","min":[0.8,-1,-1],"max":[2,2,1]}})";
-
-std::string translation(double z, const std::string& more = "") {
-  return R"({"level":0,"blend":"quartic","deformation":{"type":"translation","vector":[0,0,)" +
-         std::to_string(z) + "]}" + more + "}";
-}
 
 
 }  // namespace

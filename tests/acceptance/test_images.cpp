@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "tests/acceptance/cloud_files.h"
+#include "tests/acceptance/bodies.h"
 #include "tests/acceptance/daemon.h"
 #include "tests/server/synthetic.h"
 #include "tests/support/png_file.h"

@@ -12,6 +12,7 @@ void bench_smoothing(BenchReport& report);
 void bench_editing(BenchReport& report);
 void bench_frames(BenchReport& report);
 void bench_session(BenchReport& report);
+void bench_undo(BenchReport& report);
 /// Only where the daemon is built.
 void bench_http(BenchReport& report);
 

@@ -1,6 +1,7 @@
 #include <chrono>
 
 #include "protocol/json/documents.h"
+#include "protocol/json/recipe.h"
 #include "tests/protocol/golden.h"
 
 namespace pointwright::protocol::golden {
@@ -150,6 +151,16 @@ Deformation sequence() {
        Rotation{.point = axis_point(), .axis = Vec3d::UnitY(), .angle_rad = to_radians(37.5)}});
 }
 
+JsonDocument recipe() {
+  const PaintOperation foot{
+      .shape = PointSet{.points = {Vec3d(0.0, 0.01, 0.0), Vec3d(0.01, 0.02, 0.0)}, .radii = {0.02, 0.0125}}};
+  const PaintOperation tip{.shape = PointSet{.points = {Vec3d(0.0, 0.125, 0.05)}, .radii = {0.03}}};
+  const RecipeEdit painted{.paints = true, .zero = {foot}, .one = {tip}, .edit = edits()[0].edit};
+  const RecipeEdit after{.edit = edits()[1].edit};
+  std::string text = recipe_head(ready().level_scales) + to_text(to_json(painted)) + ",\n";
+  return JsonDocument::parse(text + to_text(to_json(after)) + std::string(recipe_tail()));
+}
+
 Problem invalid() {
   return {.kind = ProblemKind::kInvalidValue,
           .detail = "/shape/radius: must be a number, but is null (and 1 more fault)",
@@ -203,6 +214,8 @@ std::vector<File> document_files() {
       {"edit-toward-point",
        edit_of(TowardPoint{.target = Vec3d(0.0, 0.125, 0.0), .amount = 0.25}, Blend::kQuintic)},
       {"edit-twist", edit_of(twist())},
+      {"recipe", recipe()},
+      {"recipe-request", JsonDocument{{"recipe", recipe()}, {"s", 0.5}, {"timing", "together"}}},
       {"problem-invalid", to_json(invalid())},
       {"problem-stale", to_json(stale())},
       {"problem-limit", to_json(too_large())},

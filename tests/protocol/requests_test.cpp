@@ -5,30 +5,14 @@
 #include <numbers>
 #include <random>
 
+#include "tests/protocol/request_checks.h"
+
 using namespace pointwright;
 using namespace pointwright::protocol;
+using namespace pointwright::test;
 
 namespace {
 
-template <typename T>
-T accepted(std::string_view text, Parsed<T> (*parse)(const Json&)) {
-  auto value = parse_body(text, {}, parse);
-  REQUIRE_MESSAGE(value.ok(), (value.ok() ? "" : value.errors().summary()));
-  return std::move(value).value();
-}
-
-/// The pointers that the refusal names.
-template <typename T>
-std::vector<std::string> refused(std::string_view text, Parsed<T> (*parse)(const Json&)) {
-  auto value = parse_body(text, {}, parse);
-  REQUIRE_MESSAGE(!value.ok(), text);
-  CHECK(value.errors().kind == JsonErrorKind::kInvalid);
-  std::vector<std::string> pointers;
-  for (const JsonFault& fault : value.errors().faults) pointers.push_back(fault.pointer);
-  return pointers;
-}
-
-using Pointers = std::vector<std::string>;
 constexpr const char* kId = "Jq3cT9rVwXyZ0a1b2c3d4e";
 
 }  // namespace

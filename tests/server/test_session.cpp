@@ -8,76 +8,12 @@
 #include "protocol/frames/frame.h"
 #include "protocol/json/parse.h"
 #include "protocol/json/requests.h"
-#include "tests/server/synthetic.h"
+#include "tests/server/workshop.h"
 
 using namespace pointwright;
 using namespace pointwright::server;
 using namespace pointwright::test;
 using protocol::ProblemKind;
-
-namespace {
-
-template <typename Condition>
-bool comes_true(Condition condition) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return true;
-}
-
-/// Pools, and sessions on a small sheet.
-struct Workshop {
-  explicit Workshop(int threads = 0) : interactive(2, threads), background(1, threads) {}
-  ComputePool interactive;
-  ComputePool background;
-  std::shared_ptr<const Cloud> cloud = std::make_shared<const Cloud>(wavy_sheet(40));
-  std::size_t max_painting_vertices = 1'000'000;
-
-  std::shared_ptr<Session> open(std::uint64_t history_bytes = 1ULL << 30U,
-                                HierarchyBuilder build = build_hierarchy) {
-    return Session::create({.id = "AAAAAAAAAAAAAAAAAAAAAA",
-                            .name = "sheet",
-                            .cloud_id = "BBBBBBBBBBBBBBBBBBBBBB",
-                            .cloud = cloud,
-                            .hierarchy = {.scales = {0.05F}},
-                            .history_bytes = history_bytes,
-                            .max_edits = 50,
-                            .max_operations = 5,
-                            .max_painting_vertices = max_painting_vertices},
-                           {.interactive = interactive, .background = background, .build = std::move(build)});
-  }
-  std::shared_ptr<Session> ready(std::uint64_t history_bytes = 1ULL << 30U) {
-    auto session = open(history_bytes);
-    REQUIRE(comes_true([&] { return session->document()->state != protocol::SessionState::kBuilding; }));
-    REQUIRE(session->document()->state == protocol::SessionState::kReady);
-    return session;
-  }
-  std::shared_ptr<Session> painted(std::uint64_t history_bytes = 1ULL << 30U) {
-    auto session = ready(history_bytes);
-    REQUIRE(session->paint(RegionKind::kZero, left_of(0.2)).ok());
-    REQUIRE(session->paint(RegionKind::kOne, right_of(0.8)).ok());
-    return session;
-  }
-};
-
-std::shared_ptr<const RecordedEdit> commit(Session& session, const EditParams& params) {
-  const auto committed = session.commit(params, session.document()->revision);
-  REQUIRE(committed.ok());
-  return committed.value().record;
-}
-
-const Level& finest(const Session& session) {
-  return session.document()->surface.surface->finest();
-}
-
-ProblemKind kind_of(const auto& outcome) {
-  REQUIRE_FALSE(outcome.ok());
-  return outcome.problem().kind;
-}
-
-}  // namespace
 
 TEST_CASE("a session builds, says how far it is, and becomes ready") {
   Workshop workshop;

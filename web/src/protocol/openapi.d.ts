@@ -417,6 +417,37 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sessions/{session}/recipe": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        /**
+         * The applied edits as a recipe
+         * @description Regions are written as balls that cover the painted samples on the surface before their edit: exactly these samples
+         *     here, and the same part of the surface on other samplings, up to the spacing at its border. The same history gives
+         *     the same bytes. Applied to a new session of the same cloud with the same levels, a recipe gives the same samples, to
+         *     the bit.
+         */
+        get: operations["getRecipe"];
+        put?: never;
+        /**
+         * Apply a recipe
+         * @description Appends its edits to those that are applied, all or none, as one change; edits that were undone are dropped, and the
+         *     regions become those of the last edit. With s below 1 the edits are recorded with the amounts that they have then.
+         *     The session may be used meanwhile, but a change to it refuses the recipe (412).
+         */
+        post: operations["applyRecipe"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sessions/{session}/samples": {
         parameters: {
             query?: never;
@@ -966,6 +997,32 @@ export interface components {
         Head: {
             /** @description How many edits stay applied; 0: none */
             edit: number;
+        };
+        /**
+         * @description How n edits play from s = 0 to s = 1. sequence: one after the other; of s n = i + f the first i are whole and the next one is at f of its amount. together: each is at s of its amount, with the regions that it has on the whole edits.
+         * @default sequence
+         * @enum {string}
+         */
+        Timing: "sequence" | "together";
+        /** @description One edit. Its regions are painted from empty marks on the surface as it stands before the edit, zero first. An edit other than the first may leave out both: the samples keep the marks of the edit before. */
+        RecipeEdit: components["schemas"]["EditMembers"] & {
+            zero?: components["schemas"]["PaintingRequest"];
+            one?: components["schemas"]["PaintingRequest"];
+        };
+        Recipe: {
+            /** @constant */
+            format: "pointwright-recipe";
+            /** @constant */
+            version: 1;
+            /** @description Of the session's levels, model units; other sessions must have the same, to a millionth of each */
+            level_scales: number[];
+            edits: components["schemas"]["RecipeEdit"][];
+        };
+        RecipeRequest: {
+            recipe: components["schemas"]["Recipe"];
+            /** @default 1 */
+            s: number;
+            timing?: components["schemas"]["Timing"];
         };
         /** @description The payload of a stream record of type 2; its event may be one that a receiver does not know */
         StreamEvent: components["schemas"]["SessionEvent"] | components["schemas"]["ProgressEvent"] | components["schemas"]["HeartbeatEvent"] | components["schemas"]["EndEvent"];
@@ -1951,6 +2008,66 @@ export interface operations {
             default: components["responses"]["Problem"];
         };
     };
+    getRecipe: {
+        parameters: {
+            query?: never;
+            header?: {
+                "If-None-Match"?: components["parameters"]["IfNoneMatch"];
+            };
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The recipe */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    ETag: components["headers"]["ETag"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Recipe"];
+                };
+            };
+            304: components["responses"]["NotModified"];
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    applyRecipe: {
+        parameters: {
+            query?: never;
+            header: {
+                /** @description The revision that the recipe is applied to, as the session's ETag says it; or * for any */
+                "If-Match": string;
+            };
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RecipeRequest"];
+            };
+        };
+        responses: {
+            200: components["responses"]["Session"];
+            400: components["responses"]["Problem"];
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            428: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
     getSamples: {
         parameters: {
             query?: {
@@ -1958,6 +2075,9 @@ export interface operations {
                 format?: "ply" | "draco" | "xyz" | "frame";
                 /** @description The level of the hierarchy; the finest where not given */
                 level?: number;
+                /** @description Plays the applied edits part of the way, recording nothing: 0 is the rest, 1 the committed state, both to the bit */
+                s?: number;
+                timing?: components["schemas"]["Timing"];
                 /** @description What a frame carries beside the positions, as far as the cloud has it */
                 attributes?: components["parameters"]["Attributes"];
             };

@@ -1,0 +1,40 @@
+#include "server/handlers/cloud_file.h"
+#include "server/handlers/handlers.h"
+#include "server/handlers/query.h"
+#include "server/sessions/recipes.h"
+
+namespace pointwright::server {
+
+Response get_recipe(Service& service, const Request& request) {
+  const auto session = session_of(service, request);
+  if (!session.ok()) return problem_response(session.problem(), request);
+  if (const std::string etag = revision_tag(session.value()->document()->revision);
+      is_unchanged(request.head, etag))
+    return not_modified(etag);
+  auto exported = computed(service.background, [&] { return export_recipe(*session.value()); });
+  if (!exported.ok()) return problem_response(exported.problem(), request);
+  if (!exported.value().ok()) return problem_response(exported.value().problem(), request);
+  RecipeText recipe = std::move(exported.value().value());
+  auto answer = text_answer(service, std::move(recipe.text), "application/json; charset=utf-8");
+  if (!answer.ok()) return problem_response(answer.problem(), request);
+  return answer.value()
+      .with_header("ETag", revision_tag(recipe.revision))
+      .with_header("Cache-Control", "no-cache")
+      .with_header("Content-Disposition", download_name(session.value()->name(), ".recipe.json"));
+}
+
+Response post_recipe(Service& service, const Request& request) {
+  const auto session = session_of(service, request);
+  if (!session.ok()) return problem_response(session.problem(), request);
+  const auto revision = required_revision(request.head);
+  if (!revision.ok()) return problem_response(revision.problem(), request);
+  const auto recipe = parsed_body(request, protocol::parse_recipe_request, recipe_limits(service));
+  if (!recipe.ok()) return problem_response(recipe.problem(), request);
+  const auto applied = computed(
+      service.background, [&] { return apply_recipe(*session.value(), recipe.value(), revision.value()); });
+  if (!applied.ok()) return problem_response(applied.problem(), request);
+  if (!applied.value().ok()) return problem_response(applied.value().problem(), request);
+  return session_response(*session.value(), *applied.value().value());
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,196 @@
+// A recipe's edits on a session: all of them or none.
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "server/sessions/recipe_play.h"
+
+namespace pointwright::server {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+using protocol::RecipeEdit;
+
+namespace {
+
+/// Level scales of a recipe and of a session are the same where they differ by no more than this of their
+/// size: they are lengths that went through float32 fractions of a diagonal.
+constexpr double kScaleTolerance = 1e-6;
+
+std::string place_of(std::size_t edit) {
+  return "/recipe/edits/" + std::to_string(edit);
+}
+
+/// The problem of one edit of the recipe, its pointers those of the document.
+Problem problem_of_edit(const Error& error, std::size_t edit) {
+  Problem problem = protocol::to_problem(error);
+  problem.detail = "edit " + std::to_string(edit + 1) + ": " + problem.detail;
+  for (protocol::JsonFault& fault : problem.errors) fault.pointer.insert(0, place_of(edit));
+  if (problem.errors.empty()) problem.errors.push_back({.pointer = place_of(edit), .detail = error.message});
+  return problem;
+}
+
+std::string list_of(const std::vector<double>& scales) {
+  std::string text;
+  for (const double scale : scales)
+    text += (text.empty() ? "" : ", ") + protocol::to_text(protocol::JsonDocument(scale));
+  return "[" + text + "]";
+}
+
+std::optional<Problem> check_scales(const std::vector<double>& asked, const std::vector<double>& own) {
+  bool same = asked.size() == own.size();
+  for (std::size_t k = 0; same && k < own.size(); ++k)
+    same = std::abs(asked[k] - own[k]) <= kScaleTolerance * own[k];
+  if (same) return std::nullopt;
+  const std::string detail =
+      "the recipe is for levels of the scales " + list_of(asked) + ", the session has " + list_of(own);
+  return Problem{.kind = ProblemKind::kInvalidValue,
+                 .detail = detail,
+                 .errors = {{.pointer = "/recipe/level_scales", .detail = "not those of the session"}}};
+}
+
+std::optional<Problem> check_limits(const Session& session, std::size_t head,
+                                    const std::vector<RecipeEdit>& edits) {
+  const SessionParams& params = session.params();
+  if (edits.size() > params.max_edits - std::min(head, params.max_edits))
+    return Problem{.kind = ProblemKind::kTooMany,
+                   .detail = "with the recipe the history would hold more edits than it may",
+                   .errors = {{.pointer = "/recipe/edits", .detail = "too many for the history"}},
+                   .limit = static_cast<double>(params.max_edits),
+                   .actual = static_cast<double>(head + edits.size())};
+  for (std::size_t i = 0; i < edits.size(); ++i) {
+    for (const auto& [region, name] :
+         {std::pair(&edits[i].zero, "/zero"), std::pair(&edits[i].one, "/one")}) {
+      const std::string pointer = place_of(i) + name + "/operations";
+      if (region->size() > params.max_operations)
+        return Problem{.kind = ProblemKind::kTooMany,
+                       .detail = "a region of the recipe has more operations than a painting may have",
+                       .errors = {{.pointer = pointer, .detail = "too many operations"}},
+                       .limit = static_cast<double>(params.max_operations),
+                       .actual = static_cast<double>(region->size())};
+      if (const std::size_t vertices = vertices_of(*region); vertices > params.max_painting_vertices)
+        return Problem{.kind = ProblemKind::kTooManySamples,
+                       .detail = "the shapes of a region have more vertices than a painting may have",
+                       .errors = {{.pointer = pointer, .detail = "too many vertices"}},
+                       .limit = static_cast<double>(params.max_painting_vertices),
+                       .actual = static_cast<double>(vertices)};
+    }
+  }
+  return std::nullopt;
+}
+
+std::shared_ptr<const Marks> painted(const Session& session, const SurfaceState& state,
+                                     const RecipeEdit& edit) {
+  const Level& finest = state.surface->finest();
+  const PaintSurface surface{.position = finest.position,
+                             .normal = finest.normal,
+                             .origin = session.cloud().origin,
+                             .graph = session.rest().graph.get()};
+  auto marks = std::make_shared<Marks>(finest.position.size(), std::uint8_t{0});
+  for (const PaintOperation& operation : edit.zero)
+    paint(operation, RegionKind::kZero, surface, *marks, &session.context());
+  for (const PaintOperation& operation : edit.one)
+    paint(operation, RegionKind::kOne, surface, *marks, &session.context());
+  return marks;
+}
+
+Painting painting_of(const std::vector<PaintOperation>& operations, const Marks& marks, RegionKind kind) {
+  auto list = std::make_shared<OperationList>();
+  for (const PaintOperation& operation : operations)
+    list->push_back(std::make_shared<const PaintOperation>(operation));
+  return {.samples = count_marked(marks, kind),
+          .vertices = vertices_of(operations),
+          .operations = std::move(list)};
+}
+
+/// The recipe on its way onto a fork of the session's history.
+class Application {
+ public:
+  Application(const Session& session, Session::Fork fork)
+      : session_(session), fork_(std::move(fork)), whole_(fork_.history.current()) {}
+
+  /// Makes and records `part` of an edit; nothing of it where there is none. `goes_on`: another one follows,
+  /// painted on the surface of whole edits.
+  std::optional<Problem> add(std::size_t index, const RecipeEdit& edit, double part, bool goes_on) {
+    if (edit.paints) {
+      marks_ = painted(session_, whole_, edit);
+      painted_ = &edit;
+    }
+    if (auto problem = record(index, recordable_part(edit.edit, part))) return problem;
+    if (part == 1.0 && whole_is_recorded_) {
+      whole_ = fork_.history.current();
+    } else if (goes_on) {
+      whole_is_recorded_ = false;
+      auto next = played(session_, whole_, edit.edit, marks_);
+      if (!next) return problem_of_edit(next.error(), index);
+      whole_ = std::move(next).value();
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] Session::Fork finish() {
+    if (painted_ == nullptr) return std::move(fork_);
+    Document document = *fork_.document;
+    document.marks = marks_;
+    document.zero = painting_of(painted_->zero, *marks_, RegionKind::kZero);
+    document.one = painting_of(painted_->one, *marks_, RegionKind::kOne);
+    fork_.document = std::make_shared<const Document>(std::move(document));
+    return std::move(fork_);
+  }
+
+ private:
+  std::optional<Problem> record(std::size_t index, const EditParams& params) {
+    History& history = fork_.history;
+    if (auto valid = validate(params, *history.current().surface); !valid)
+      return problem_of_edit(valid.error(), index);
+    if (params.level < history.current().first_valid_level) {
+      auto derived = with_valid_level(session_.rest(), history.current(), params.level, session_.context());
+      if (!derived) return problem_of_edit(derived.error(), index);
+      history.replace_current(std::move(derived).value());
+    }
+    auto after = played(session_, history.current(), params, marks_);
+    if (!after) return problem_of_edit(after.error(), index);
+    auto recorded = std::make_shared<RecordedEdit>();
+    recorded->index = history.head() + 1;
+    recorded->params = params;
+    recorded->marks = marks_;
+    recorded->created = std::chrono::system_clock::now();
+    recorded->moved_samples = count_moved(*history.current().surface, *after.value().surface);
+    recorded->zero_samples = count_marked(*marks_, RegionKind::kZero);
+    recorded->one_samples = count_marked(*marks_, RegionKind::kOne);
+    history.push(std::move(recorded), std::move(after).value());
+    return std::nullopt;
+  }
+
+  const Session& session_;
+  Session::Fork fork_;
+  SurfaceState whole_;  // with all edits so far whole: what paintings are made on
+  bool whole_is_recorded_ = true;
+  std::shared_ptr<const Marks> marks_;
+  const RecipeEdit* painted_ = nullptr;
+};
+
+}  // namespace
+
+Outcome<SharedDocument> apply_recipe(Session& session, const protocol::RecipeRequest& request,
+                                     Session::Expected expected) {
+  auto forked = session.fork(expected);
+  if (!forked.ok()) return forked.problem();
+  const SharedDocument before = forked.value().document;
+  const std::vector<RecipeEdit>& edits = request.recipe.edits;
+  if (auto problem = check_scales(request.recipe.level_scales, session.describe(*before).level_scales))
+    return *problem;
+  if (auto problem = check_limits(session, before->head, edits)) return *problem;
+  Application application(session, std::move(forked.value()));
+  const bool in_sequence = request.timing == protocol::Timing::kSequence;
+  const SequencePlace place = place_in_sequence(request.s, edits.size());
+  const std::size_t count = in_sequence ? place.whole + (place.part > 0.0 ? 1 : 0) : edits.size();
+  if (count == 0) return before;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double part = !in_sequence ? request.s : i < place.whole ? 1.0 : place.part;
+    if (auto problem = application.add(i, edits[i], part, i + 1 < count)) return *problem;
+  }
+  return session.adopt(application.finish());
+}
+
+}  // namespace pointwright::server

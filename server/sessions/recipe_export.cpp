@@ -1,0 +1,52 @@
+// The edits of a session as the text of a recipe.
+
+#include "engine/core/parallel.h"
+#include "engine/editing/ball_cover.h"
+#include "server/sessions/recipe_play.h"
+
+namespace pointwright::server {
+namespace {
+
+std::vector<PaintOperation> cover_of(const Session& session, const Points& position, const Marks& marks,
+                                     RegionKind kind) {
+  SampleMask members(marks.size(), 0);
+  parallel_for(marks.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      members[i] = static_cast<std::uint8_t>((marks[i] & static_cast<unsigned>(kind)) != 0U);
+  });
+  std::vector<PaintOperation> operations;
+  for (PointSet& balls : ball_cover(position, members, session.cloud().origin, &session.context()))
+    operations.push_back({.mode = PaintMode::kAdd, .shape = std::move(balls)});
+  return operations;
+}
+
+}  // namespace
+
+Outcome<RecipeText> export_recipe(Session& session) {
+  auto ready = ready_now(session);
+  if (!ready.ok()) return ready.problem();
+  const Document& now = *ready.value();
+  RecipeText recipe{.text = protocol::recipe_head(session.describe(now).level_scales),
+                    .revision = now.revision};
+  KnownStates states(session, *now.edits);
+  for (std::size_t i = 0; i < now.head; ++i) {
+    const RecordedEdit& record = *(*now.edits)[i];
+    protocol::RecipeEdit edit{.edit = record.params};
+    // What is compared is what is marked, not who shares it: an undone painting leaves no trace.
+    edit.paints = i == 0 || *record.marks != *(*now.edits)[i - 1]->marks;
+    if (edit.paints) {
+      const auto before = states.after(i);
+      if (!before.ok()) return before.problem();
+      const Points& position = before.value().surface->finest().position;
+      edit.zero = cover_of(session, position, *record.marks, RegionKind::kZero);
+      edit.one = cover_of(session, position, *record.marks, RegionKind::kOne);
+      if (session.context().is_cancelled()) return protocol::to_problem(cancelled_error());
+    }
+    if (i > 0) recipe.text += ",\n";
+    recipe.text += protocol::to_text(protocol::to_json(edit));
+  }
+  recipe.text += protocol::recipe_tail();
+  return recipe;
+}
+
+}  // namespace pointwright::server

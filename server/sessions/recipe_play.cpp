@@ -1,0 +1,116 @@
+#include "server/sessions/recipe_play.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/editing/partial_edit.h"
+
+namespace pointwright::server {
+namespace {
+
+void snap_angle(double& angle_rad) {
+  angle_rad = protocol::to_radians(protocol::to_degrees(angle_rad));
+}
+
+/// The edits one after the other: the first ones from the history, the last of them in part.
+Outcome<SurfaceState> in_sequence(Session& session, const EditList& edits, double s) {
+  const SequencePlace place = place_in_sequence(s, edits.size());
+  auto state = KnownStates(session, edits).after(place.whole);
+  if (!state.ok() || place.part == 0.0) return state;
+  const RecordedEdit& next = *edits[place.whole];
+  auto part = played(session, state.value(), recordable_part(next.params, place.part), next.marks);
+  if (!part) return protocol::to_problem(part.error());
+  return std::move(part).value();
+}
+
+Outcome<SurfaceState> together(Session& session, const EditList& edits, double s) {
+  if (s == 1.0) return KnownStates(session, edits).after(edits.size());
+  auto rest = KnownStates(session, edits).after(0);
+  if (!rest.ok() || s == 0.0) return rest;
+  SurfaceState state = std::move(rest.value());
+  for (const auto& edit : edits) {
+    auto next = played(session, state, recordable_part(edit->params, s), edit->marks);
+    if (!next) return protocol::to_problem(next.error());
+    state = std::move(next).value();
+  }
+  return state;
+}
+
+}  // namespace
+
+EditParams recordable_part(const EditParams& edit, double s) {
+  EditParams part = scaled(edit, s);
+  if (s == 1.0) return part;
+  for (ElementaryDeformation& step : part.deformation.steps) {
+    if (auto* const rotation = std::get_if<Rotation>(&step)) snap_angle(rotation->angle_rad);
+    if (auto* const twist = std::get_if<Twist>(&step)) snap_angle(twist->angle_rad);
+  }
+  return part;
+}
+
+SequencePlace place_in_sequence(double s, std::size_t edits) {
+  const double reached = s * static_cast<double>(edits);
+  const std::size_t whole = std::min(static_cast<std::size_t>(std::floor(reached)), edits);
+  return {.whole = whole, .part = whole == edits ? 0.0 : reached - static_cast<double>(whole)};
+}
+
+Result<SurfaceState> played(const Session& session, const SurfaceState& before, const EditParams& edit,
+                            const std::shared_ptr<const Marks>& marks) {
+  if (auto valid = validate(edit, *before.surface); !valid) return valid.error();
+  if (session.context().is_cancelled()) return cancelled_error();
+  RecordedEdit record;
+  record.params = edit;
+  record.marks = marks;
+  auto after = replayed(session.rest(), before, record, session.context());
+  if (!after) return after;
+  if (auto reach = check_reach(*after.value().surface, edit.level); !reach) return reach.error();
+  return after;
+}
+
+Outcome<SurfaceState> KnownStates::after(std::size_t edit) {
+  if (here_.state.surface == nullptr || here_.edit != edit) {
+    auto known = session_.known_state(edits_, edit);
+    if (!known.ok()) return known.problem();
+    const bool behind = here_.state.surface == nullptr || here_.edit > edit;
+    if (behind || known.value().edit > here_.edit) here_ = std::move(known.value());
+  }
+  for (; here_.edit < edit; ++here_.edit) {
+    if (session_.context().is_cancelled()) return protocol::to_problem(cancelled_error());
+    auto next = replayed(session_.rest(), here_.state, *edits_[here_.edit], session_.context());
+    if (!next) return protocol::to_problem(next.error());
+    here_.state = std::move(next).value();
+  }
+  return here_.state;
+}
+
+Outcome<SharedDocument> ready_now(Session& session) {
+  if (session.closed_reason())
+    return protocol::Problem{.kind = protocol::ProblemKind::kNotFound, .detail = "the session was deleted"};
+  SharedDocument now = session.document();
+  if (now->state != protocol::SessionState::kReady)
+    return protocol::Problem{.kind = protocol::ProblemKind::kWrongState,
+                             .detail = "the session is not ready"};
+  return now;
+}
+
+Outcome<Picture> partial_picture(Session& session, std::uint32_t level, const Play& play, bool with_t) {
+  auto ready = ready_now(session);
+  if (!ready.ok()) return ready.problem();
+  const Document& now = *ready.value();
+  const auto head = now.edits->begin() + static_cast<std::ptrdiff_t>(now.head);
+  const EditList applied(now.edits->begin(), head);
+  auto reached = play.timing == protocol::Timing::kSequence ? in_sequence(session, applied, play.s)
+                                                            : together(session, applied, play.s);
+  if (!reached.ok()) return reached.problem();
+  auto state = with_valid_level(session.rest(), reached.value(), level, session.context());
+  if (!state) return protocol::to_problem(state.error());
+  std::shared_ptr<const ScaleField> field;
+  if (with_t) {
+    const std::uint32_t coarsest = state.value().first_valid_level;
+    if (auto made = field_of(session.rest(), state.value(), coarsest, Blend::kQuartic, *now.marks); made)
+      field = made.value();  // without usable regions t is 0 everywhere
+  }
+  return session.picture_of(now, state.value(), std::move(field), 0);
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,42 @@
+#pragma once
+// Steps that exporting, applying and playing share.
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+#include "server/sessions/recipes.h"
+
+namespace pointwright::server {
+
+/// s n = whole + part.
+struct SequencePlace {
+  std::size_t whole = 0;  ///< edits that are made whole
+  double part = 0.0;      ///< of the edit after them, in [0, 1)
+};
+SequencePlace place_in_sequence(double s, std::size_t edits);
+
+/// The state after an edit with a painting; what it may be refused for when it is made, it is refused for
+/// here too.
+/// Errors: those of validate(), of replaying and of check_reach()
+Result<SurfaceState> played(const Session& session, const SurfaceState& before, const EditParams& edit,
+                            const std::shared_ptr<const Marks>& marks);
+
+/// A walk along recorded edits that takes what the session's history knows and replays the rest.
+class KnownStates {
+ public:
+  /// Pre: the list is the session's, now or at some time; both outlive the walk
+  KnownStates(Session& session, const EditList& edits) : session_(session), edits_(edits) {}
+  /// The state after `edit` edits. Fast for ascending ones.
+  Outcome<SurfaceState> after(std::size_t edit);
+
+ private:
+  Session& session_;
+  const EditList& edits_;
+  History::Known here_;
+};
+
+/// The document of a session that is ready. Problem: wrong state, or deleted.
+Outcome<SharedDocument> ready_now(Session& session);
+
+}  // namespace pointwright::server
