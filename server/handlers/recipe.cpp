@@ -1,6 +1,7 @@
 #include "server/handlers/cloud_file.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/query.h"
+#include "server/handlers/shape_data.h"
 #include "server/sessions/recipes.h"
 
 namespace pointwright::server {
@@ -28,8 +29,17 @@ Response post_recipe(Service& service, const Request& request) {
   if (!session.ok()) return problem_response(session.problem(), request);
   const auto revision = required_revision(request.head);
   if (!revision.ok()) return problem_response(revision.problem(), request);
-  const auto recipe = parsed_body(request, protocol::parse_recipe_request, recipe_limits(service));
+  auto recipe = parsed_body(request, protocol::parse_recipe_request, recipe_limits(service));
   if (!recipe.ok()) return problem_response(recipe.problem(), request);
+  std::vector<protocol::RecipeEdit>& edits = recipe.value().recipe.edits;
+  for (std::size_t i = 0; i < edits.size(); ++i) {
+    const std::string pointer = "/recipe/edits/" + std::to_string(i);
+    for (const auto& [name, operations] :
+         {std::pair("/zero", &edits[i].zero), std::pair("/one", &edits[i].one)}) {
+      const auto found = find_data(service, *session.value(), pointer + name + "/operations", *operations);
+      if (!found.ok()) return problem_response(found.problem(), request);
+    }
+  }
   const auto applied = computed(
       service.background, [&] { return apply_recipe(*session.value(), recipe.value(), revision.value()); });
   if (!applied.ok()) return problem_response(applied.problem(), request);

@@ -1,4 +1,5 @@
 #include "server/handlers/handlers.h"
+#include "server/handlers/shape_data.h"
 
 namespace pointwright::server {
 namespace {
@@ -6,30 +7,6 @@ namespace {
 /// The region that the second capture names; the route lets only known names through.
 RegionKind region_of(const Request& request) {
   return protocol::region_of_name(request.captures.at(1)).value();
-}
-
-/// Puts in what an operation's shape names by its id: an image or a cloud. `pointer`: to the operation.
-/// Problem: kInvalidValue where there is no such thing, or no texture coordinates to map an image by
-Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
-                        PaintOperation& operation) {
-  const auto refused = [&](const char* member, const char* detail) {
-    return Problem{.kind = ProblemKind::kInvalidValue,
-                   .detail = detail,
-                   .errors = {{.pointer = pointer + member, .detail = detail}}};
-  };
-  if (auto* shape = std::get_if<ImageShape>(&operation.shape)) {
-    const SharedImage image = service.images.find(shape->source);
-    if (image == nullptr) return refused("/shape/image", "there is no such image");
-    shape->image = image->image;
-  }
-  if (auto* shape = std::get_if<ModelShape>(&operation.shape)) {
-    const SharedCloud cloud = service.clouds.find(shape->source);
-    if (cloud == nullptr) return refused("/shape/cloud", "there is no such cloud");
-    shape->cloud = cloud->cloud;
-  }
-  if (needs_texcoord(operation.shape) && session.cloud().texcoord.empty())
-    return refused("/shape/projection", "the session's cloud has no texture coordinates");
-  return Done{};
 }
 
 }  // namespace
@@ -52,11 +29,8 @@ Response replace_painting(Service& service, const Request& request) {
   if (!session.ok()) return problem_response(session.problem(), request);
   auto operations = parsed_body(service, request, protocol::parse_painting);
   if (!operations.ok()) return problem_response(operations.problem(), request);
-  for (std::size_t i = 0; i < operations.value().size(); ++i) {
-    const auto found =
-        find_data(service, *session.value(), "/operations/" + std::to_string(i), operations.value()[i]);
-    if (!found.ok()) return problem_response(found.problem(), request);
-  }
+  if (const auto found = find_data(service, *session.value(), "/operations", operations.value()); !found.ok())
+    return problem_response(found.problem(), request);
   const auto expected = expected_revision(request.head);
   if (!expected.ok()) return problem_response(expected.problem(), request);
   const auto painted =

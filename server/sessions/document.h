@@ -16,13 +16,6 @@ namespace pointwright::server {
 /// The operations of a painting. Lists share them: appending copies none.
 using OperationList = std::vector<std::shared_ptr<const PaintOperation>>;
 
-/// What the shapes of operations count with against the limit of a painting.
-inline std::size_t vertices_of(const std::vector<PaintOperation>& operations) {
-  std::size_t count = 0;
-  for (const PaintOperation& operation : operations) count += vertex_count(operation.shape);
-  return count;
-}
-
 /// One region as it was painted.
 struct Painting {
   std::size_t samples = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "server/sessions/painter.h"
 #include "server/sessions/recipe_play.h"
 
 namespace pointwright::server {
@@ -59,49 +60,7 @@ std::optional<Problem> check_limits(const Session& session, std::size_t head,
                    .errors = {{.pointer = "/recipe/edits", .detail = "too many for the history"}},
                    .limit = static_cast<double>(params.max_edits),
                    .actual = static_cast<double>(head + edits.size())};
-  for (std::size_t i = 0; i < edits.size(); ++i) {
-    for (const auto& [region, name] :
-         {std::pair(&edits[i].zero, "/zero"), std::pair(&edits[i].one, "/one")}) {
-      const std::string pointer = place_of(i) + name + "/operations";
-      if (region->size() > params.max_operations)
-        return Problem{.kind = ProblemKind::kTooMany,
-                       .detail = "a region of the recipe has more operations than a painting may have",
-                       .errors = {{.pointer = pointer, .detail = "too many operations"}},
-                       .limit = static_cast<double>(params.max_operations),
-                       .actual = static_cast<double>(region->size())};
-      if (const std::size_t vertices = vertices_of(*region); vertices > params.max_painting_vertices)
-        return Problem{.kind = ProblemKind::kTooManySamples,
-                       .detail = "the shapes of a region have more vertices than a painting may have",
-                       .errors = {{.pointer = pointer, .detail = "too many vertices"}},
-                       .limit = static_cast<double>(params.max_painting_vertices),
-                       .actual = static_cast<double>(vertices)};
-    }
-  }
   return std::nullopt;
-}
-
-std::shared_ptr<const Marks> painted(const Session& session, const SurfaceState& state,
-                                     const RecipeEdit& edit) {
-  const Level& finest = state.surface->finest();
-  const PaintSurface surface{.position = finest.position,
-                             .normal = finest.normal,
-                             .origin = session.cloud().origin,
-                             .graph = session.rest().graph.get()};
-  auto marks = std::make_shared<Marks>(finest.position.size(), std::uint8_t{0});
-  for (const PaintOperation& operation : edit.zero)
-    paint(operation, RegionKind::kZero, surface, *marks, &session.context());
-  for (const PaintOperation& operation : edit.one)
-    paint(operation, RegionKind::kOne, surface, *marks, &session.context());
-  return marks;
-}
-
-Painting painting_of(const std::vector<PaintOperation>& operations, const Marks& marks, RegionKind kind) {
-  auto list = std::make_shared<OperationList>();
-  for (const PaintOperation& operation : operations)
-    list->push_back(std::make_shared<const PaintOperation>(operation));
-  return {.samples = count_marked(marks, kind),
-          .vertices = vertices_of(operations),
-          .operations = std::move(list)};
 }
 
 /// The recipe on its way onto a fork of the session's history.
@@ -114,8 +73,7 @@ class Application {
   /// painted on the surface of whole edits.
   std::optional<Problem> add(std::size_t index, const RecipeEdit& edit, double part, bool goes_on) {
     if (edit.paints) {
-      marks_ = painted(session_, whole_, edit);
-      painted_ = &edit;
+      if (auto problem = paint(index, edit)) return problem;
     }
     if (auto problem = record(index, recordable_part(edit.edit, part))) return problem;
     if (part == 1.0 && whole_is_recorded_) {
@@ -129,16 +87,39 @@ class Application {
     return std::nullopt;
   }
   [[nodiscard]] Session::Fork finish() {
-    if (painted_ == nullptr) return std::move(fork_);
+    if (marks_ == nullptr) return std::move(fork_);
     Document document = *fork_.document;
     document.marks = marks_;
-    document.zero = painting_of(painted_->zero, *marks_, RegionKind::kZero);
-    document.one = painting_of(painted_->one, *marks_, RegionKind::kOne);
+    document.zero = std::move(zero_);
+    document.one = std::move(one_);
     fork_.document = std::make_shared<const Document>(std::move(document));
     return std::move(fork_);
   }
 
  private:
+  std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
+    auto marks = std::make_shared<Marks>(whole_.surface->finest().position.size(), std::uint8_t{0});
+    const PaintSurface surface = paint_surface(session_.rest(), whole_);
+    Painter zero(session_.params(), surface, RegionKind::kZero, {});
+    Painter one(session_.params(), surface, RegionKind::kOne, {});
+    if (auto problem = paint(zero, edit.zero, *marks, place_of(index) + "/zero/operations")) return problem;
+    if (auto problem = paint(one, edit.one, *marks, place_of(index) + "/one/operations")) return problem;
+    zero_ = zero.finish(*marks);
+    one_ = one.finish(*marks);
+    marks_ = std::move(marks);
+    return std::nullopt;
+  }
+  std::optional<Problem> paint(Painter& painter, const std::vector<PaintOperation>& operations, Marks& marks,
+                               const std::string& pointer) const {
+    for (std::size_t i = 0; i < operations.size(); ++i) {
+      const auto painted = painter.paint(operations[i], marks, session_.context());
+      if (painted.ok()) continue;
+      Problem problem = painted.problem();
+      problem.errors.push_back({.pointer = pointer + "/" + std::to_string(i), .detail = problem.detail});
+      return problem;
+    }
+    return std::nullopt;
+  }
   std::optional<Problem> record(std::size_t index, const EditParams& params) {
     History& history = fork_.history;
     if (auto valid = validate(params, *history.current().surface); !valid)
@@ -167,7 +148,8 @@ class Application {
   SurfaceState whole_;  // with all edits so far whole: what paintings are made on
   bool whole_is_recorded_ = true;
   std::shared_ptr<const Marks> marks_;
-  const RecipeEdit* painted_ = nullptr;
+  Painting zero_;  // those of marks_
+  Painting one_;
 };
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "engine/core/moved_cloud.h"
-#include "engine/editing/resolved_painting.h"
+#include "server/sessions/painter.h"
 #include "server/sessions/session.h"
 
 namespace pointwright::server {
@@ -17,21 +17,6 @@ namespace {
 protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) {
   const Box3f box = bounds_of(position);
   return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
-}
-
-// Whether a region may have as many operations, with as many vertices in all.
-Outcome<Done> check_painting(const SessionParams& params, std::size_t operations, std::size_t vertices) {
-  if (operations > params.max_operations)
-    return Problem{.kind = ProblemKind::kTooMany,
-                   .detail = "the region has as many operations as a painting may have",
-                   .limit = static_cast<double>(params.max_operations),
-                   .actual = static_cast<double>(operations)};
-  if (vertices > params.max_painting_vertices)
-    return Problem{.kind = ProblemKind::kTooManySamples,
-                   .detail = "the shapes of the region have more vertices than a painting may have",
-                   .limit = static_cast<double>(params.max_painting_vertices),
-                   .actual = static_cast<double>(vertices)};
-  return Done{};
 }
 
 }  // namespace
@@ -60,41 +45,22 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<Pa
   last_preview_.reset();
   drag_.reset();
   const SharedDocument before = document();
-  const Painting& painting = before->painting(kind);
-  auto list = std::make_shared<OperationList>();
-  if (append) *list = *painting.operations;
-  std::size_t vertices = append ? painting.vertices : 0;
   auto marks = std::make_shared<Marks>(*before->marks);
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
-  const Level& finest = before->surface.surface->finest();
-  const PaintSurface surface{.position = finest.position,
-                             .normal = finest.normal,
-                             .origin = params_.cloud->origin,
-                             .graph = rest_.graph.get(),
-                             .texcoord = &params_.cloud->texcoord};
+  Painter painter(params_, paint_surface(rest_, before->surface), kind,
+                  append ? before->painting(kind) : Painting{});
   for (const PaintOperation& operation : operations) {
-    // What is recorded is what is painted: the list gives these marks again, here and on another sampling.
-    std::vector<PaintOperation> recorded = resolved(operation, kind, surface, *marks, &context_);
+    if (auto painted = painter.paint(operation, *marks, context_); !painted.ok()) return painted.problem();
     if (auto open = check_open(); !open.ok()) return open.problem();
-    for (const PaintOperation& each : recorded) vertices += vertex_count(each.shape);
-    if (auto fits = check_painting(params_, list->size() + recorded.size(), vertices); !fits.ok())
-      return fits.problem();
-    for (PaintOperation& each : recorded) {
-      pointwright::paint(each, kind, surface, *marks, &context_);
-      if (auto open = check_open(); !open.ok()) return open.problem();
-      list->push_back(std::make_shared<const PaintOperation>(std::move(each)));
-    }
   }
   Painted result;
   for (std::size_t i = 0; i < marks->size(); ++i)
     if ((*marks)[i] != (*before->marks)[i]) ++result.changed;
 
   Document after = *before;
-  Painting& painted = kind == RegionKind::kZero ? after.zero : after.one;
-  painted.operations = std::move(list);
-  painted.vertices = vertices;
-  after.zero.samples = count_marked(*marks, RegionKind::kZero);
+  (kind == RegionKind::kZero ? after.zero : after.one) = painter.finish(*marks);
+  after.zero.samples = count_marked(*marks, RegionKind::kZero);  // painting may steal from the other region
   after.one.samples = count_marked(*marks, RegionKind::kOne);
   after.marks = std::move(marks);
   ++after.revision;

@@ -1,0 +1,40 @@
+#include "server/handlers/shape_data.h"
+
+namespace pointwright::server {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+
+Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
+                        PaintOperation& operation) {
+  const auto refused = [&](const char* member, const char* detail) {
+    return Problem{.kind = ProblemKind::kInvalidValue,
+                   .detail = detail,
+                   .errors = {{.pointer = pointer + member, .detail = detail}}};
+  };
+  if (auto* shape = std::get_if<ImageShape>(&operation.shape)) {
+    const SharedImage image = service.images.find(shape->source);
+    if (image == nullptr) return refused("/shape/image", "there is no such image");
+    shape->image = image->image;
+  }
+  if (auto* shape = std::get_if<ModelShape>(&operation.shape)) {
+    const SharedCloud cloud = service.clouds.find(shape->source);
+    if (cloud == nullptr) return refused("/shape/cloud", "there is no such cloud");
+    shape->cloud = cloud->cloud;
+  }
+  if (needs_texcoord(operation.shape) && session.cloud().texcoord.empty())
+    return refused("/shape/projection", "the session's cloud has no texture coordinates");
+  return Done{};
+}
+
+Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
+                        std::vector<PaintOperation>& operations) {
+  for (std::size_t i = 0; i < operations.size(); ++i) {
+    if (auto found = find_data(service, session, pointer + "/" + std::to_string(i), operations[i]);
+        !found.ok())
+      return found;
+  }
+  return Done{};
+}
+
+}  // namespace pointwright::server

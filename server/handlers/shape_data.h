@@ -1,0 +1,20 @@
+#pragma once
+// What the shapes of painting operations name by an id: images and other clouds.
+
+#include <string>
+#include <vector>
+
+#include "engine/editing/painting.h"
+#include "server/handlers/service.h"
+
+namespace pointwright::server {
+
+/// Puts in what the operation's shape names. `pointer`: to the operation.
+/// Problem: kInvalidValue where there is no such thing, or no texture coordinates to map an image by
+Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
+                        PaintOperation& operation);
+/// The same for a list. `pointer`: to the list.
+Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
+                        std::vector<PaintOperation>& operations);
+
+}  // namespace pointwright::server
