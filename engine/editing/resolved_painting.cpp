@@ -31,14 +31,7 @@ class Resolver {
 
   // The samples of the mask join or leave.
   [[nodiscard]] Operations each(PaintMode mode, const SampleMask& mask) const {
-    Operations operations;
-    for (PointSet& set : ball_cover(surface_.position, mask, surface_.origin, context_)) {
-      PaintOperation& operation = operations.emplace_back();
-      operation.mode = mode;
-      operation.shape.emplace<PointSet>(std::move(set));
-      operation.steal = steal_;
-    }
-    return operations;
+    return cover_operations(mode, mask, surface_.position, surface_.origin, steal_, context_);
   }
 
   // Exactly the samples of the mask.
@@ -104,6 +97,19 @@ Operations resolved(const PaintOperation& operation, RegionKind kind, const Pain
       break;
   }
   return {operation};
+}
+
+std::vector<PaintOperation> cover_operations(PaintMode mode, const SampleMask& mask, const Points& position,
+                                             const Vec3d& origin, bool steal,
+                                             const ExecutionContext* context) {
+  std::vector<PaintOperation> operations;
+  for (PointSet& set : ball_cover(position, mask, origin, context)) {
+    PaintOperation& operation = operations.emplace_back();
+    operation.mode = mode;
+    operation.shape.emplace<PointSet>(std::move(set));
+    operation.steal = steal;
+  }
+  return operations;
 }
 
 }  // namespace pointwright

@@ -22,4 +22,10 @@ std::vector<PaintOperation> resolved(const PaintOperation& operation, RegionKind
                                      const PaintSurface& surface, const Marks& marks,
                                      const ExecutionContext* context = nullptr);
 
+/// Operations of the mode (one with a shape) over the ball cover of the samples, one for each of its point
+/// sets. None where the mask is empty. Cost, Determinism, Cancels: those of ball_cover()
+std::vector<PaintOperation> cover_operations(PaintMode mode, const SampleMask& mask, const Points& position,
+                                             const Vec3d& origin, bool steal = false,
+                                             const ExecutionContext* context = nullptr);
+
 }  // namespace pointwright

@@ -1,7 +1,7 @@
 // The edits of a session as the text of a recipe.
 
 #include "engine/core/parallel.h"
-#include "engine/editing/ball_cover.h"
+#include "engine/editing/resolved_painting.h"
 #include "server/sessions/recipe_play.h"
 
 namespace pointwright::server {
@@ -14,10 +14,8 @@ std::vector<PaintOperation> cover_of(const Session& session, const Points& posit
     for (std::size_t i = begin; i < end; ++i)
       members[i] = static_cast<std::uint8_t>((marks[i] & static_cast<unsigned>(kind)) != 0U);
   });
-  std::vector<PaintOperation> operations;
-  for (PointSet& balls : ball_cover(position, members, session.cloud().origin, &session.context()))
-    operations.push_back({.mode = PaintMode::kAdd, .shape = std::move(balls)});
-  return operations;
+  return cover_operations(PaintMode::kAdd, members, position, session.cloud().origin, false,
+                          &session.context());
 }
 
 }  // namespace
