@@ -51,9 +51,8 @@ void bench_http(BenchReport& report) {
   const test::Reply uploaded =
       daemon.upload({reinterpret_cast<const char*>(file.value().data()), file.value().size()});
   expect(uploaded, 201);
-  std::string scales;
-  for (const float scale : kThreeScales) scales += (scales.empty() ? "[" : ",") + std::to_string(scale);
-  const std::string session = daemon.open_session(uploaded.json()["id"], scales + "]");
+  const std::string session =
+      daemon.open_session(uploaded.json()["id"], nlohmann::json(kThreeScales).dump());
   expect(daemon.ask("POST", session + "/regions/one/operations", kOneSide), 200);
   expect(daemon.ask("POST", session + "/regions/zero/operations", kZeroSide), 200);
   test::StreamReader stream(daemon, session + "/stream?attributes=normal,t");

@@ -112,12 +112,12 @@ TEST_CASE("painting counts what changed and raises the revision") {
 
 // The list as a client reads it and sends it back.
 std::vector<PaintOperation> read_back(const Painting& painting) {
-  std::string list;
+  protocol::JsonDocument list = protocol::JsonDocument::array();
   for (const auto& operation : *painting.operations) {
     CHECK_FALSE(depends_on_sampling(*operation));
-    list += (list.empty() ? "" : ",") + protocol::to_json(*operation).dump();
+    list.push_back(protocol::to_json(*operation));
   }
-  const auto document = protocol::parse_json(R"({"operations":[)" + list + "]}");
+  const auto document = protocol::parse_json(protocol::JsonDocument{{"operations", list}}.dump());
   REQUIRE(document.ok());
   auto parsed = protocol::parse_painting(document.value());
   REQUIRE(parsed.ok());
