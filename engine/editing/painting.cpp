@@ -243,9 +243,9 @@ SampleMask covered_samples(const PaintOperation& operation, RegionKind kind, con
   if (!has_shape(operation.mode)) return covered;
   POINTWRIGHT_CHECK(!operation.facing || surface.normal.size() == n, "one normal per sample");
   POINTWRIGHT_CHECK(has_its_data(operation.shape), "the image or model of the shape");
-  POINTWRIGHT_CHECK(!needs_texcoord(operation.shape) ||
-                        (surface.texcoord != nullptr && surface.texcoord->size() == n),
-                    "one texture coordinate per sample");
+  POINTWRIGHT_CHECK(
+      !needs_texcoord(operation.shape) || (surface.texcoord != nullptr && surface.texcoord->size() == n),
+      "one texture coordinate per sample");
   const ShapeCover shape(operation, surface, context);
   parallel_for(
       n,

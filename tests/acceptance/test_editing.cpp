@@ -18,10 +18,7 @@ using namespace pointwright;
 using namespace pointwright::test;
 using nlohmann::json;
 
-namespace {
-
-
-}  // namespace
+namespace {}  // namespace
 
 TEST_CASE(
     "a cloud is uploaded, painted, previewed, edited and downloaded, and what was not touched keeps its "

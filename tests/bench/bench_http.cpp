@@ -51,8 +51,7 @@ void bench_http(BenchReport& report) {
   const test::Reply uploaded =
       daemon.upload({reinterpret_cast<const char*>(file.value().data()), file.value().size()});
   expect(uploaded, 201);
-  const std::string session =
-      daemon.open_session(uploaded.json()["id"], nlohmann::json(kThreeScales).dump());
+  const std::string session = daemon.open_session(uploaded.json()["id"], nlohmann::json(kThreeScales).dump());
   expect(daemon.ask("POST", session + "/regions/one/operations", kOneSide), 200);
   expect(daemon.ask("POST", session + "/regions/zero/operations", kZeroSide), 200);
   test::StreamReader stream(daemon, session + "/stream?attributes=normal,t");
