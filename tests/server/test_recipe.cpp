@@ -268,7 +268,7 @@ TEST_CASE("what a recipe is refused for is named with its place, and nothing of 
   check_refused(recipe, ProblemKind::kInvalidValue, "/recipe/edits/1/deformation");
   recipe = good;
   recipe.recipe.edits[0].one.assign(6, right_of(0.9));
-  check_refused(recipe, ProblemKind::kTooMany, "/recipe/edits/0/one/operations");
+  check_refused(recipe, ProblemKind::kTooMany, "/recipe/edits/0/one/operations/5");
   recipe = good;
   recipe.recipe.edits.insert(recipe.recipe.edits.end(), 2, good.recipe.edits[1]);
   check_refused(recipe, ProblemKind::kTooMany, "/recipe/edits");

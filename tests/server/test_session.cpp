@@ -131,7 +131,7 @@ TEST_CASE("a painting that was made by operations on samples gives the same mark
                              .steal = true,
                              .flood = {.seed = Vec3d(0.5, 0.5, 0.0), .radius = 0.3, .stop_at_other = true}};
   const std::vector<PaintOperation> operations = {
-      {.shape = AxisBox{.min = Vec3d(0.4, 0.0, -1.0), .max = Vec3d(0.9, 1.0, 1.0)},
+      {.shape = AxisBox{.min = Vec3d(0.4, 0.0, -1.0), .max = Vec3d(0.7, 1.0, 1.0)},
        .facing = Vec3d(0.6, 0.0, 0.8)},
       flood,
       {.mode = PaintMode::kGrow, .distance = 0.07},
@@ -145,6 +145,8 @@ TEST_CASE("a painting that was made by operations on samples gives the same mark
       commit(*second, lift(0.3));
     }
     for (const PaintOperation& operation : operations) {
+      CAPTURE(static_cast<int>(operation.mode));
+      CAPTURE(edited);
       const auto painted = made->paint(RegionKind::kZero, operation);
       REQUIRE(painted.ok());
       CHECK(painted.value().changed > 0);
