@@ -252,7 +252,7 @@ SampleMask covered_samples(const PaintOperation& operation, RegionKind kind, con
       [&](std::size_t begin, std::size_t end) { shape.cover(begin, end, covered.data() + begin, context); },
       kParallelBlock, context);
   const auto* screen = std::get_if<ScreenShape>(&operation.shape);
-  if (screen != nullptr && screen->visible) {
+  if (screen != nullptr && screen->visible && std::ranges::find(covered, 1) != covered.end()) {
     const SampleMask visible = visible_samples(*screen, surface, context);
     std::ranges::transform(covered, visible, covered.begin(),
                            [](std::uint8_t a, std::uint8_t b) { return static_cast<std::uint8_t>(a & b); });

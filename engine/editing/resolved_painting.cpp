@@ -64,7 +64,7 @@ Operations resolved(const PaintOperation& operation, RegionKind kind, const Pain
                     const Marks& marks, const ExecutionContext* context) {
   if (!depends_on_sampling(operation)) return {operation};
   SampleMask covered = covered_samples(operation, kind, surface, marks, context);
-  if (has_shape(operation.mode)) {
+  if (has_shape(operation.mode) && !is_none(covered)) {
     const std::optional<PaintOperation> plain = unfiltered(operation);
     if (plain && covered_samples(*plain, kind, surface, marks, context) == covered) return {*plain};
   }

@@ -12,7 +12,9 @@ Response get_recipe(Service& service, const Request& request) {
   if (const std::string etag = revision_tag(session.value()->document()->revision);
       is_unchanged(request.head, etag))
     return not_modified(etag);
-  auto exported = computed(service.background, [&] { return export_recipe(*session.value()); });
+  auto exported = computed(service.background, [&] {
+    return export_recipe(*session.value(), service.config.limits.max_recipe_bytes);
+  });
   if (!exported.ok()) return problem_response(exported.problem(), request);
   if (!exported.value().ok()) return problem_response(exported.value().problem(), request);
   RecipeText recipe = std::move(exported.value().value());
@@ -29,7 +31,7 @@ Response post_recipe(Service& service, const Request& request) {
   if (!session.ok()) return problem_response(session.problem(), request);
   const auto revision = required_revision(request.head);
   if (!revision.ok()) return problem_response(revision.problem(), request);
-  auto recipe = parsed_body(request, protocol::parse_recipe_request, recipe_limits(service));
+  auto recipe = parsed_body(request, protocol::parse_recipe_request, large_limits(service));
   if (!recipe.ok()) return problem_response(recipe.problem(), request);
   std::vector<protocol::RecipeEdit>& edits = recipe.value().recipe.edits;
   for (std::size_t i = 0; i < edits.size(); ++i) {

@@ -27,14 +27,14 @@ Response get_painting(Service& service, const Request& request) {
 Response replace_painting(Service& service, const Request& request) {
   const auto session = session_of(service, request);
   if (!session.ok()) return problem_response(session.problem(), request);
-  auto operations = parsed_body(service, request, protocol::parse_painting);
+  auto operations = parsed_body(request, protocol::parse_painting, large_limits(service));
   if (!operations.ok()) return problem_response(operations.problem(), request);
   if (const auto found = find_data(service, *session.value(), "/operations", operations.value()); !found.ok())
     return problem_response(found.problem(), request);
   const auto expected = expected_revision(request.head);
   if (!expected.ok()) return problem_response(expected.problem(), request);
   const auto painted =
-      session.value()->replace_painting(region_of(request), std::move(operations.value()), expected.value());
+      session.value()->replace_painting(region_of(request), operations.value(), expected.value());
   if (!painted.ok()) return problem_response(painted.problem(), request);
   return session_response(*session.value(), *painted.value().document);
 }

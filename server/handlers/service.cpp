@@ -74,7 +74,7 @@ protocol::ParseLimits json_limits(const Service& service) {
           .max_depth = static_cast<std::size_t>(service.config.limits.max_json_depth)};
 }
 
-protocol::ParseLimits recipe_limits(const Service& service) {
+protocol::ParseLimits large_limits(const Service& service) {
   // Most of a recipe are numbers with many digits: this is more values than any such text holds, and in
   // proportion to its bytes no more than an ordinary document may have.
   constexpr std::uint64_t kBytesPerValue = 8;

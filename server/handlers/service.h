@@ -68,9 +68,9 @@ Outcome<Session::Expected> required_revision(const RequestHead& head);
 Response session_response(const Session& session, const Document& document, int status = 200);
 std::string revision_tag(std::uint64_t revision);
 
-/// What parsers accept of an ordinary document; of a recipe.
+/// What parsers accept of an ordinary document; of a recipe or a whole painting.
 protocol::ParseLimits json_limits(const Service& service);
-protocol::ParseLimits recipe_limits(const Service& service);
+protocol::ParseLimits large_limits(const Service& service);
 
 /// Parses the body with one of the protocol's parsers, within the limits.
 template <typename T>

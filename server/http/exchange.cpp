@@ -109,7 +109,7 @@ std::optional<Problem> Exchange::check_body(const BodyPolicy& policy) const {
                    .actual = static_cast<double>(length)};
   }
   const std::string type = head.media_type();
-  const bool is_json = policy.kind == BodyPolicy::Kind::kJson || policy.kind == BodyPolicy::Kind::kRecipe;
+  const bool is_json = policy.kind == BodyPolicy::Kind::kJson || policy.kind == BodyPolicy::Kind::kLargeJson;
   if (is_json && type != "application/json")
     return Problem{.kind = ProblemKind::kUnsupportedMediaType, .detail = "send application/json"};
   if (policy.kind == BodyPolicy::Kind::kCloud && type != "model/x-draco" && type != "application/x-ply" &&

@@ -86,7 +86,7 @@ struct Response {
 
 /// What the body of a route may be.
 struct BodyPolicy {
-  enum class Kind { kNone, kJson, kRecipe, kCloud, kImage };
+  enum class Kind { kNone, kJson, kLargeJson, kCloud, kImage };
   Kind kind = Kind::kNone;
   std::uint64_t max_bytes = 0;
 };

@@ -34,7 +34,7 @@ constexpr std::array kRoutes = {
     Route{kGet, "/v1/sessions/{id}", Body::kNone, get_session},
     Route{kDelete, "/v1/sessions/{id}", Body::kNone, delete_session},
     Route{kGet, "/v1/sessions/{id}/regions/{region}", Body::kNone, get_painting},
-    Route{kPut, "/v1/sessions/{id}/regions/{region}", Body::kJson, replace_painting},
+    Route{kPut, "/v1/sessions/{id}/regions/{region}", Body::kLargeJson, replace_painting},
     Route{kDelete, "/v1/sessions/{id}/regions/{region}", Body::kNone, clear_painting},
     Route{kPost, "/v1/sessions/{id}/regions/{region}/operations", Body::kJson, paint_region},
     Route{kPut, "/v1/sessions/{id}/preview", Body::kJson, put_preview},
@@ -44,7 +44,7 @@ constexpr std::array kRoutes = {
     Route{kPost, "/v1/sessions/{id}/edits", Body::kJson, post_edit},
     Route{kPut, "/v1/sessions/{id}/head", Body::kJson, put_head},
     Route{kGet, "/v1/sessions/{id}/recipe", Body::kNone, get_recipe},
-    Route{kPost, "/v1/sessions/{id}/recipe", Body::kRecipe, post_recipe},
+    Route{kPost, "/v1/sessions/{id}/recipe", Body::kLargeJson, post_recipe},
     Route{kGet, "/v1/sessions/{id}/samples", Body::kNone, get_samples},
     Route{kGet, "/v1/sessions/{id}/stream", Body::kNone, get_stream},
 };
@@ -67,7 +67,7 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
       return {.kind = route.body, .max_bytes = 0};
     case Body::kJson:
       return {.kind = route.body, .max_bytes = limits.max_json_bytes};
-    case Body::kRecipe:
+    case Body::kLargeJson:
       return {.kind = route.body, .max_bytes = limits.max_recipe_bytes};
     case Body::kCloud:
       return {.kind = route.body, .max_bytes = limits.max_upload_bytes};

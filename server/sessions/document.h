@@ -19,7 +19,7 @@ using OperationList = std::vector<std::shared_ptr<const PaintOperation>>;
 /// One region as it was painted.
 struct Painting {
   std::size_t samples = 0;
-  std::size_t vertices = 0;  ///< of all strokes
+  std::size_t vertices = 0;  ///< of strokes and outlines, and balls
   std::shared_ptr<const OperationList> operations;
 };
 

@@ -16,6 +16,8 @@ constexpr double kDerivationCost = 10.0;
 constexpr std::uint64_t kStepsPerWhole = 4;
 /// Steps that were dropped have no memory any more: after so many edits a whole state is kept in any case.
 constexpr std::size_t kEditsPerWhole = 64;
+/// Steps and whole states have room for so many surfaces, however much the paintings take.
+constexpr std::uint64_t kLeastSurfaces = 3;
 /// A replay of n edits leaves whole states n / 2, n / 4 and n / 8 edits before its end: going on in the same
 /// direction replays less and less. Of shorter ways than this it leaves none.
 constexpr std::size_t kLeastReplay = 8;
@@ -249,6 +251,7 @@ Result<void> History::move_head(std::size_t edit) {
   Walk walk(nodes_, *best);  // from the rest there always is a way
   while (walk.place().node > edit) walk.step_back();
   const std::size_t start = walk.place().node;
+  std::size_t oldest = start + 1;
   while (walk.place().node < edit) {
     const std::size_t from = walk.place().node;
     if (!walk.turn_to_next()) {
@@ -265,6 +268,8 @@ Result<void> History::move_head(std::size_t edit) {
     nodes_[from + 1].step =
         std::make_shared<const SurfaceDelta>(*walk.state().surface, *next.value().surface);
     walk.jump(std::move(next).value(), {.node = from + 1, .derived = false});
+    // The steps behind are renewed as far as there is room; those nearest to where the way ends stay.
+    while (memory() > budget() && oldest <= from) nodes_[oldest++].step.reset();
     const std::size_t left = edit - from - 1;
     if (left >= kLeastReplay && std::has_single_bit(left) && left * 8 >= edit - start)
       nodes_[from + 1].whole = walk.state();
@@ -343,10 +348,17 @@ History::Victim History::cheapest_to_lose() const {
   return least;
 }
 
+std::uint64_t History::budget() const {
+  // Paintings cannot be replayed, so they are never dropped: beside them there is always room for the last
+  // steps, however many they are.
+  const std::uint64_t least = std::min(budget_bytes_, kLeastSurfaces * memory_of(current_));
+  return std::max(budget_bytes_, marks_memory() + least);
+}
+
 void History::trim() {
   // What is cheapest to lose goes first: what it costs to get back, for each byte, weighed by how far from
   // the head it is. So the last edits stay at hand, and whole states thin out with their distance.
-  while (memory() > budget_bytes_) {
+  while (memory() > budget()) {
     const Victim victim = cheapest_to_lose();
     Node& node = nodes_[victim.node];
     if (victim.kind == Victim::Kind::kNone) return;

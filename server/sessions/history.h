@@ -90,6 +90,7 @@ class History {
   /// What the way costs, in edits replayed; none where there is no way.
   [[nodiscard]] std::optional<double> cost_of_way(Place from, std::size_t edit) const;
   [[nodiscard]] bool pays_whole(std::size_t node) const;
+  [[nodiscard]] std::uint64_t budget() const;
   void trim();
   [[nodiscard]] Victim cheapest_to_lose() const;
   [[nodiscard]] std::uint64_t states_memory() const;

@@ -16,8 +16,8 @@ using protocol::RecipeEdit;
 namespace {
 
 /// Level scales of a recipe and of a session are the same where they differ by no more than this of their
-/// size: they are lengths that went through float32 fractions of a diagonal.
-constexpr double kScaleTolerance = 1e-6;
+/// size: sessions take them as fractions of a diagonal, which differs a little from sampling to sampling.
+constexpr double kScaleTolerance = 1e-3;
 
 std::string place_of(std::size_t edit) {
   return "/recipe/edits/" + std::to_string(edit);
@@ -99,20 +99,22 @@ class Application {
  private:
   std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
     auto marks = std::make_shared<Marks>(whole_.surface->finest().position.size(), std::uint8_t{0});
-    const PaintSurface surface = paint_surface(session_.rest(), whole_);
-    Painter zero(session_.params(), surface, RegionKind::kZero, {});
-    Painter one(session_.params(), surface, RegionKind::kOne, {});
-    if (auto problem = paint(zero, edit.zero, *marks, place_of(index) + "/zero/operations")) return problem;
-    if (auto problem = paint(one, edit.one, *marks, place_of(index) + "/one/operations")) return problem;
-    zero_ = zero.finish(*marks);
-    one_ = one.finish(*marks);
+    Painter painter(session_.params(), paint_surface(session_.rest(), whole_), {}, {});
+    const std::string place = place_of(index);
+    if (auto problem = paint(painter, RegionKind::kZero, edit.zero, *marks, place + "/zero/operations"))
+      return problem;
+    if (auto problem = paint(painter, RegionKind::kOne, edit.one, *marks, place + "/one/operations"))
+      return problem;
+    zero_ = painter.finish(RegionKind::kZero, *marks);
+    one_ = painter.finish(RegionKind::kOne, *marks);
     marks_ = std::move(marks);
     return std::nullopt;
   }
-  std::optional<Problem> paint(Painter& painter, const std::vector<PaintOperation>& operations, Marks& marks,
+  std::optional<Problem> paint(Painter& painter, RegionKind kind,
+                               const std::vector<PaintOperation>& operations, Marks& marks,
                                const std::string& pointer) const {
     for (std::size_t i = 0; i < operations.size(); ++i) {
-      const auto painted = painter.paint(operations[i], marks, session_.context());
+      const auto painted = painter.paint(kind, operations[i], marks, session_.context());
       if (painted.ok()) continue;
       Problem problem = painted.problem();
       problem.errors.push_back({.pointer = pointer + "/" + std::to_string(i), .detail = problem.detail});

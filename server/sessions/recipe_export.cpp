@@ -14,13 +14,14 @@ std::vector<PaintOperation> cover_of(const Session& session, const Points& posit
     for (std::size_t i = begin; i < end; ++i)
       members[i] = static_cast<std::uint8_t>((marks[i] & static_cast<unsigned>(kind)) != 0U);
   });
-  return cover_operations(PaintMode::kAdd, members, position, session.cloud().origin, false,
-                          &session.context());
+  // On a finer sampling the two covers may meet by less than a spacing: the one-region takes what is between.
+  return cover_operations(PaintMode::kAdd, members, position, session.cloud().origin,
+                          kind == RegionKind::kOne, &session.context());
 }
 
 }  // namespace
 
-Outcome<RecipeText> export_recipe(Session& session) {
+Outcome<RecipeText> export_recipe(Session& session, std::uint64_t max_bytes) {
   auto ready = ready_now(session);
   if (!ready.ok()) return ready.problem();
   const Document& now = *ready.value();
@@ -42,6 +43,12 @@ Outcome<RecipeText> export_recipe(Session& session) {
     }
     if (i > 0) recipe.text += ",\n";
     recipe.text += protocol::to_text(protocol::to_json(edit));
+    if (recipe.text.size() > max_bytes)
+      return protocol::Problem{
+          .kind = protocol::ProblemKind::kOutOfSpace,
+          .detail = "the recipe is larger than one that can be applied (max_recipe_bytes)",
+          .limit = static_cast<double>(max_bytes),
+          .actual = static_cast<double>(recipe.text.size())};
   }
   recipe.text += protocol::recipe_tail();
   return recipe;

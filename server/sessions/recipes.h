@@ -30,8 +30,8 @@ struct RecipeText {
 /// Promises: a function of the edits, their paintings and the rest state alone; applied to a fresh session of
 ///           the same cloud with the same levels it gives the same bits on every valid level, unless a
 ///           painting has marked one of several samples at the very same place (ball_cover.h)
-/// Problems: wrong state, those of the replay
-Outcome<RecipeText> export_recipe(Session& session);
+/// Problems: wrong state, those of the replay; out of space beyond `max_bytes` (and the bytes of one edit)
+Outcome<RecipeText> export_recipe(Session& session, std::uint64_t max_bytes);
 
 /// Appends the recipe's edits to the session's applied ones, all or none, as one change; its regions become
 /// those of the last edit. A part of a recipe records the edits with the amounts that they have then. A

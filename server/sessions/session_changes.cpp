@@ -48,10 +48,13 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<Pa
   auto marks = std::make_shared<Marks>(*before->marks);
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
-  Painter painter(params_, paint_surface(rest_, before->surface), kind,
-                  append ? before->painting(kind) : Painting{});
+  const bool is_zero = kind == RegionKind::kZero;
+  Painter painter(params_, paint_surface(rest_, before->surface),
+                  append || !is_zero ? before->zero : Painting{},
+                  append || is_zero ? before->one : Painting{});
   for (const PaintOperation& operation : operations) {
-    if (auto painted = painter.paint(operation, *marks, context_); !painted.ok()) return painted.problem();
+    if (auto painted = painter.paint(kind, operation, *marks, context_); !painted.ok())
+      return painted.problem();
     if (auto open = check_open(); !open.ok()) return open.problem();
   }
   Painted result;
@@ -59,9 +62,8 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<Pa
     if ((*marks)[i] != (*before->marks)[i]) ++result.changed;
 
   Document after = *before;
-  (kind == RegionKind::kZero ? after.zero : after.one) = painter.finish(*marks);
-  after.zero.samples = count_marked(*marks, RegionKind::kZero);  // painting may steal from the other region
-  after.one.samples = count_marked(*marks, RegionKind::kOne);
+  after.zero = painter.finish(RegionKind::kZero, *marks);
+  after.one = painter.finish(RegionKind::kOne, *marks);
   after.marks = std::move(marks);
   ++after.revision;
   publish(std::move(after));

@@ -31,19 +31,22 @@ auto has_id(const std::string& id) {
   return [&id](const SharedImage& image) { return image->document.id == id; };
 }
 
+ImageLimits image_limits(const Limits& limits) {
+  return {.max_side = limits.max_image_side, .max_pixels = limits.max_image_pixels};
+}
+
 }  // namespace
 
 ImageDecoder confined_image_decoder(const Limits& limits, std::shared_ptr<DecodeSlots> slots) {
-  const ImageLimits image_limits{.max_side = limits.max_image_side, .max_pixels = limits.max_image_pixels};
-  return [image_limits, slots = std::move(slots)](std::span<const std::byte> bytes) {
+  return [claims = image_limits(limits), slots = std::move(slots)](std::span<const std::byte> bytes) {
     ConfineLimits confine;
     confine.slots = slots.get();
-    return decode_image_confined(bytes, image_limits, confine);
+    return decode_image_confined(bytes, claims, confine);
   };
 }
 
 ImageStore::ImageStore(const Limits& limits)
-    : max_images_(limits.max_images), memory_(limits.max_image_bytes) {}
+    : max_images_(limits.max_images), limits_(image_limits(limits)), memory_(limits.max_image_bytes) {}
 
 Outcome<Done> ImageStore::check_room_locked() const {
   if (images_.size() < max_images_) return Done{};
@@ -60,20 +63,24 @@ Outcome<Done> ImageStore::check_room() const {
 
 Outcome<SharedImage> ImageStore::add(const ImageDecoder& decode, std::span<const std::byte> file) {
   if (file.empty()) return Problem{.kind = ProblemKind::kEmptyBody, .detail = "the upload has no bytes"};
+  // What the header claims is reserved before anything is decoded.
+  const auto claim = png_gate(file, limits_);
+  if (!claim) return protocol::to_problem(claim.error());
+  const std::uint64_t claimed = claim.value().value_bytes + file.size();
+  auto stored = std::make_shared<StoredImage>();
+  stored->memory = memory_.hold(claimed);
+  if (stored->memory == nullptr)
+    return Problem{.kind = ProblemKind::kOutOfSpace,
+                   .detail = "the memory for images is used up",
+                   .limit = static_cast<double>(memory_.total()),
+                   .actual = static_cast<double>(memory_.held() + claimed)};
   auto decoded = decode(file);
   if (!decoded) {
     if (decoded.error().field == "decoder")
       return Problem{.kind = ProblemKind::kOverloaded, .detail = decoded.error().message};
     return protocol::to_problem(decoded.error());
   }
-  const std::uint64_t bytes = value_bytes(decoded.value()) + file.size();
-  auto stored = std::make_shared<StoredImage>();
-  stored->memory = memory_.hold(bytes);
-  if (stored->memory == nullptr)
-    return Problem{.kind = ProblemKind::kOutOfSpace,
-                   .detail = "the memory for images is used up",
-                   .limit = static_cast<double>(memory_.total()),
-                   .actual = static_cast<double>(memory_.held() + bytes)};
+  stored->memory->shrink_to(value_bytes(decoded.value()) + file.size());
   auto image = std::make_shared<const Image>(std::move(decoded).value());
   stored->document = {.id = random_id(),
                       .width = image->width,

@@ -15,6 +15,7 @@
 #include "server/base/outcome.h"
 #include "server/config/limits.h"
 #include "server/ingest/decode_slots.h"
+#include "server/ingest/png_reader.h"
 
 namespace pointwright::server {
 
@@ -30,7 +31,7 @@ struct StoredImage {
   std::string sha256;  ///< of the file
   std::string file;    ///< as uploaded
   std::shared_ptr<const Image> image;
-  std::shared_ptr<void> memory;  ///< the part of the budget that file and image take
+  std::shared_ptr<Budget::Hold> memory;  ///< the part of the budget that file and image take
 };
 using SharedImage = std::shared_ptr<const StoredImage>;
 
@@ -52,6 +53,7 @@ class ImageStore {
   [[nodiscard]] Outcome<Done> check_room_locked() const;
 
   const std::uint64_t max_images_;
+  const ImageLimits limits_;
   mutable Budget memory_;
   mutable std::mutex mutex_;  // guards images_
   std::vector<SharedImage> images_;

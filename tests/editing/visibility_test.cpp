@@ -159,6 +159,27 @@ double meets_torus(const Vec3d& from, const Vec3d& dir, double least, double maj
   return 1e300;
 }
 
+TEST_CASE("a thin line and a dot see no more of the sheet behind than a broad outline does") {
+  const Subject sheets(test::parallel_sheets(101, 0.01, 1.0, test::Sampling::kRegular));
+  ScreenShape shape = Camera{.eye = {0.0, 0.0, 4.0}, .half_height = 1.0, .parallel = true}.all();
+  std::size_t seen = 0;
+  for (const double width : {1e-4, 1e-3, 0.012, 0.05}) {
+    for (const std::vector<Vec2d>& vertices :
+         {std::vector<Vec2d>{{0.0, -0.4}, {0.0, 0.4}}, std::vector<Vec2d>{{0.005, 0.0}},
+          std::vector<Vec2d>{{-0.4, 0.1}, {0.4, 0.1}}}) {
+      shape.outline = ScreenPolyline{.vertices = vertices, .width = width};
+      Marks marks(sheets.surface.size(), 0);
+      paint({.shape = shape}, RegionKind::kOne, sheets.painted_on(), marks);
+      for (std::size_t i = 0; i < marks.size(); ++i) {
+        if (marks[i] == 0) continue;
+        ++seen;
+        CHECK(sheets.surface.position[i].z() > 0.0F);
+      }
+    }
+  }
+  CHECK(seen > 100);
+}
+
 TEST_CASE("a torus that hides part of itself: as rays find it") {
   const Subject torus(test::torus(30'000, 1.0, 0.35, test::Sampling::kRegular));
   const double r = static_cast<double>(torus.largest_radius);

@@ -86,6 +86,7 @@ struct Bench {
   explicit Bench(std::uint64_t budget) : truth{rest_state()}, history(truth[0], budget, work()) {}
 
   int replays = 0;
+  std::uint64_t peak = 0;  ///< of the history's memory while it replayed
   int derivations = 0;
   std::optional<std::size_t> failing;
   bool fails_to_derive = false;
@@ -96,6 +97,7 @@ struct Bench {
   History::Work work() {
     return {.replay = [this](const SurfaceState& before, const RecordedEdit& edit) -> Result<SurfaceState> {
               ++replays;
+              peak = std::max(peak, history.memory());
               if (failing == edit.index) return cancelled_error();
               CHECK(edit.params.level >= before.first_valid_level);  // the history has derived it
               return edited_state(before, edit);
@@ -245,6 +247,27 @@ TEST_CASE("even without any budget the first and the current state are kept") {
   bench.look();
   bench.push(1, 50);
   for (const std::size_t edit : {7U, 8U, 6U, 8U, 5U}) bench.go(edit);
+}
+
+TEST_CASE("while a replay runs, the steps behind it are dropped where there is no room") {
+  Bench bench(4 * kWhole);
+  bench.push_many(60, kSamples);
+  bench.go(0);
+  bench.replays = 0;
+  bench.peak = 0;
+  bench.go(50);
+  CHECK(bench.replays > 10);
+  // The budget, the whole states that a long replay leaves, and the one in the making. All steps are 15.
+  CHECK(bench.peak <= 8 * kWhole);
+}
+
+TEST_CASE("paintings that fill the budget leave room for the last steps") {
+  Bench bench(3 * kWhole);
+  for (std::size_t i = 0; i < 300; ++i)
+    bench.push(static_cast<std::uint32_t>(kBands), 100, std::make_shared<Marks>(kSamples, std::uint8_t{1}));
+  bench.replays = 0;
+  for (std::size_t i = 299; i > 290; --i) bench.go(i);
+  CHECK(bench.replays == 0);
 }
 
 TEST_CASE("a replay that fails leaves the head where it was") {

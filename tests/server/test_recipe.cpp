@@ -32,7 +32,7 @@ protocol::RecipeRequest request_of(const std::string& text, double s = 1.0,
 }
 
 std::string exported(Session& session) {
-  const auto recipe = export_recipe(session);
+  const auto recipe = export_recipe(session, 1ULL << 30U);
   REQUIRE(recipe.ok());
   CHECK(recipe.value().revision == session.document()->revision);
   return recipe.value().text;
@@ -217,6 +217,31 @@ TEST_CASE("a recipe moves the same part of a denser sampling by the same deforma
   }
   CHECK(unmarked * 20 < inside);
   CHECK(inside > 300);
+}
+
+TEST_CASE(
+    "regions that touch are told apart on a denser sampling too, and a recipe is never larger than allowed") {
+  RecipeWorkshop workshop;
+  const auto session = workshop.ready();
+  REQUIRE(session->paint(RegionKind::kZero, {.shape = Everything{}}).ok());
+  REQUIRE(session
+              ->paint(RegionKind::kOne,
+                      {.shape = Sphere{.center = Vec3d(0.5, 0.5, 0.0), .radius = 0.25}, .steal = true})
+              .ok());
+  commit(*session, lift(0.1));
+  protocol::RecipeRequest request = request_of(exported(*session));
+  RecipeWorkshop dense;
+  dense.cloud = std::make_shared<const Cloud>(wavy_sheet(117));
+  const auto other = dense.ready();
+  request.recipe.level_scales = other->describe(*other->document()).level_scales;
+  applied(*other, request);
+  CHECK(other->document()->one.samples > 8 * session->document()->one.samples);
+  CHECK(other->document()->zero.samples + other->document()->one.samples <= 117 * 117);
+
+  const auto large = export_recipe(*session, 100);
+  REQUIRE_FALSE(large.ok());
+  CHECK(kind_of(large) == ProblemKind::kOutOfSpace);
+  CHECK(large.problem().limit == 100.0);
 }
 
 TEST_CASE("what a recipe is refused for is named with its place, and nothing of it is applied") {

@@ -170,6 +170,29 @@ TEST_CASE("a painting that was made by operations on samples gives the same mark
   CHECK(*fresh->document()->marks == *made->document()->marks);
 }
 
+TEST_CASE("what one region steals is in both lists: each is put back by itself, in any order") {
+  Workshop workshop;
+  const auto session = workshop.ready();
+  const auto ball = [](double x) {
+    return PaintOperation{.shape = Sphere{.center = Vec3d(x, 0.5, 0.0), .radius = 0.25}, .steal = true};
+  };
+  REQUIRE(session->paint(RegionKind::kZero, ball(0.35)).ok());
+  REQUIRE(session->paint(RegionKind::kOne, ball(0.6)).ok());
+  REQUIRE(session->paint(RegionKind::kZero, ball(0.75)).ok());
+  const SharedDocument painted = session->document();
+  REQUIRE(painted->one.samples > 0);
+  CHECK(std::ranges::none_of(*painted->marks, [](std::uint8_t mark) { return mark == 3; }));
+  const auto zero = read_back(painted->zero);
+  const auto one = read_back(painted->one);
+  for (const bool zero_first : {false, true}) {
+    const auto second = workshop.ready();
+    if (zero_first) REQUIRE(second->replace_painting(RegionKind::kZero, zero).ok());
+    REQUIRE(second->replace_painting(RegionKind::kOne, one).ok());
+    if (!zero_first) REQUIRE(second->replace_painting(RegionKind::kZero, zero).ok());
+    CHECK(*second->document()->marks == *painted->marks);
+  }
+}
+
 TEST_CASE("what an operation on samples is recorded as counts against the limits of a painting") {
   Workshop workshop;
   workshop.max_painting_vertices = 20;
