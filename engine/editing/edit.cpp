@@ -75,9 +75,10 @@ RaiseArgs raise_args(const MultiresSurface& rest, std::size_t k, const std::vect
           .last_detail = last.now.data()};
 }
 
-TurnArgs turn_args(const Points& rest, const std::vector<std::uint32_t>& blocks, const Mat3d& rotation,
+TurnArgs turn_args(const Points& rest, const EditPlan& plan, bool bends, const Mat3d& rotation,
                    const ScaleField& field, Points& normal) {
-  TurnArgs args{.blocks = blocks.data(),
+  TurnArgs args{.blocks = (bends ? plan.bending() : plan.rigid()).data(),
+                .any_whole = bends ? plan.any_whole().data() : nullptr,
                 .t = field.t.data(),
                 .gradient = {field.gradient.x(), field.gradient.y(), field.gradient.z()},
                 .is_identity = rotation == Mat3d::Identity(),
@@ -136,7 +137,7 @@ void apply_edit(const MultiresSurface& surface, const EditPlan& plan, const Edit
       const std::vector<std::uint32_t>& blocks = bends ? plan.bending() : plan.rigid();
       const RaiseArgs raise =
           finest ? RaiseArgs{} : raise_args(surface, k, blocks, params, field, edited, last);
-      const TurnArgs turn = carries && plan.rigid_only() ? turn_args(surface.levels[k].normal, blocks,
+      const TurnArgs turn = carries && plan.rigid_only() ? turn_args(surface.levels[k].normal, plan, bends,
                                                                      rotation, field, edited.levels[k].normal)
                                                          : TurnArgs{};
       const NormalStencil::Moved moved =

@@ -17,19 +17,20 @@ bool is_rigid(const EditParams& params) {
 }
 
 // What becomes of a block's samples.
-enum class Fate : std::uint8_t { kStays, kBends, kRigid };
+enum class Fate : std::uint8_t { kStays, kBends, kBendsInPart, kRigid };
 
 Fate fate_of(std::size_t block, const ScaleField& field) {
   const std::size_t begin = block * kSimdBlock;
   const std::size_t end = std::min(begin + kSimdBlock, field.size());
-  bool any = false;
-  bool all = true;
+  bool moves = false;
+  std::size_t whole = 0;
   for (std::size_t i = begin; i < end; ++i) {
-    any = any || field.t[i] > 0.0F;
-    all = all && field.t[i] == 1.0F && field.gradient[i] == Vec3f::Zero();
+    moves = moves || field.t[i] > 0.0F;
+    whole += field.t[i] == 1.0F && field.gradient[i] == Vec3f::Zero() ? 1U : 0U;
   }
-  if (!any) return Fate::kStays;
-  return all ? Fate::kRigid : Fate::kBends;
+  if (!moves) return Fate::kStays;
+  if (whole == 0) return Fate::kBends;
+  return whole == end - begin ? Fate::kRigid : Fate::kBendsInPart;
 }
 
 }  // namespace
@@ -53,7 +54,12 @@ EditPlan::EditPlan(const MultiresSurface& surface, const NeighborGraph& graph, c
     if (fates[b] == Fate::kStays) continue;
     const auto block = static_cast<std::uint32_t>(b);
     moving_.push_back(block);
-    (rigid_only_ && fates[b] == Fate::kRigid ? rigid_ : bending_).push_back(block);
+    if (rigid_only_ && fates[b] == Fate::kRigid) {
+      rigid_.push_back(block);
+    } else {
+      bending_.push_back(block);
+      any_whole_.push_back(fates[b] == Fate::kBends ? 0 : 1);
+    }
   }
   for (std::size_t k = level_ + 1; k < surface.levels.size(); ++k) {
     stencils_.emplace_back(surface.levels[k], graph, bending_, context);
@@ -71,7 +77,7 @@ bool EditPlan::serves(const EditParams& params) const {
 
 std::size_t EditPlan::memory() const {
   std::size_t bytes = (moving_.size() + bending_.size() + rigid_.size()) * sizeof(std::uint32_t) +
-                      3 * shape_.size() * sizeof(float);
+                      any_whole_.size() + 3 * shape_.size() * sizeof(float);
   for (const NormalStencil& stencil : stencils_) bytes += stencil.memory();
   return bytes;
 }

@@ -37,6 +37,8 @@ class EditPlan {
   [[nodiscard]] const std::vector<std::uint32_t>& moving() const { return moving_; }
   [[nodiscard]] const std::vector<std::uint32_t>& bending() const { return bending_; }
   [[nodiscard]] const std::vector<std::uint32_t>& rigid() const { return rigid_; }
+  /// By entry of bending(), whether a sample of the block moves whole: t = 1 without a gradient.
+  [[nodiscard]] const std::vector<std::uint8_t>& any_whole() const { return any_whole_; }
   /// Over bending(). Pre: level() < level <= the finest.
   [[nodiscard]] const NormalStencil& stencil(std::size_t level) const {
     return stencils_[level - level_ - 1];
@@ -49,6 +51,7 @@ class EditPlan {
   bool rigid_only_;
   bool offsets_;
   std::vector<std::uint32_t> moving_, bending_, rigid_;
+  std::vector<std::uint8_t> any_whole_;
   std::vector<NormalStencil> stencils_;
   ShapeOperators shape_;
 };

@@ -17,7 +17,7 @@ namespace pointwright {
 class NormalStencil {
  public:
   /// Neighbours that count, the nearest ones of the graph.
-  static constexpr std::uint32_t kNeighbors = 8;
+  static constexpr std::uint32_t kNeighbors = kStencilNeighbors;
 
   NormalStencil() = default;
   /// blocks: those of kSimdBlock samples that will be carried, ascending.

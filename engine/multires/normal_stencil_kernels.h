@@ -10,6 +10,9 @@
 
 namespace pointwright {
 
+/// Neighbours of a stencil at most.
+inline constexpr std::uint32_t kStencilNeighbors = 8;
+
 /// What the stencils of blocks consist of; row j of the weights belongs to neighbour j.
 template <typename Weight, typename Number>
 struct StencilOf {
@@ -27,7 +30,7 @@ struct BuildStencilArgs {
   const float* normal[3];
   const std::uint32_t* neighbors;  ///< the blocked graph
   std::uint32_t graph_k;           ///< rows of its blocks
-  std::uint32_t k;                 ///< those that count
+  std::uint32_t k;                 ///< those that count, kStencilNeighbors at most
   const std::uint32_t* blocks;
   StencilOf<std::int16_t, float> stencil;
 };
