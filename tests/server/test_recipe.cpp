@@ -266,7 +266,7 @@ TEST_CASE("what a recipe is refused for is named with its place, and nothing of 
     CHECK(session->document()->surface.surface->finest() == before->surface.surface->finest());
   };
   auto recipe = good;
-  recipe.recipe.level_scales[1] *= 1.0 + 2e-6;
+  recipe.recipe.level_scales[1] *= 1.0 + 2e-3;
   check_refused(recipe, ProblemKind::kInvalidValue, "/recipe/level_scales");
   recipe.recipe.level_scales = {1.0, 0.0};
   check_refused(recipe, ProblemKind::kInvalidValue, "/recipe/level_scales");

@@ -815,10 +815,11 @@ export interface components {
             width: number;
         };
         /**
-         * @description What depends on the sampling (flood, grow, shrink, `facing`, `visible`) acts on the samples at once and is
+         * @description What depends on the sampling or on other data (flood, grow, shrink, `facing`, `visible`, image, model) acts on the samples at once and is
          *     recorded as its outcome in model space: as point sets around the samples that it covered, or as the shape alone
-         *     where `facing` and `visible` kept nothing out. A painting holds no such operation, so that it gives the same
-         *     selection again, and on another sampling the same part of the surface
+         *     where `facing` and `visible` kept nothing out. What `steal` takes from the other region is recorded there as
+         *     removed. A painting holds no such operation, so that each region's list gives its samples again by itself, and on
+         *     another sampling the same part of the surface
          */
         PaintOperation: components["schemas"]["ShapeOperation"] | components["schemas"]["MembershipOperation"] | components["schemas"]["DistanceOperation"] | components["schemas"]["FloodOperation"];
         ShapeOperation: {
@@ -1014,7 +1015,7 @@ export interface components {
             format: "pointwright-recipe";
             /** @constant */
             version: 1;
-            /** @description Of the session's levels, model units; other sessions must have the same, to a millionth of each */
+            /** @description Of the session's levels, model units; other sessions must have the same, to a thousandth of each */
             level_scales: number[];
             edits: components["schemas"]["RecipeEdit"][];
         };
