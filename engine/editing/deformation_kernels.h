@@ -67,8 +67,7 @@ struct RaiseArgs {
 /// A rotation of the normals of those samples that move as one rigid body: t = 1 without a gradient.
 struct TurnArgs {
   const std::uint32_t* blocks;
-  const std::uint8_t*
-      any_whole;  ///< by entry of the list, whether a sample is of those; null: in all of them
+  const std::uint8_t* any_whole;  ///< by entry, whether a sample of the block is one; null: of all blocks
   const float* t;
   const float* gradient[3];
   float rotation[9];  ///< by rows
