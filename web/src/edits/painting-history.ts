@@ -165,17 +165,24 @@ export class PaintingHistory {
     const { id } = this.store_;
     const put = async (region: RegionName, lists: Lists): Promise<void> =>
       this.store_.update(await this.client_.putOperations(id, region, lists[region]));
+    const from = this.store_.document.history.head;
+    const go = async (to: number): Promise<void> => {
+      const { history, revision } = this.store_.document;
+      if (to !== history.head) this.store_.update(await this.client_.putHead(id, to, revision));
+    };
     const accepted: RegionName[] = [];
     try {
+      // Lists are replayed on the surface as it is: on the one before a recipe's edits, both ways.
+      await go(Math.min(from, head));
       for (const region of order) {
         await put(region, wanted);
         accepted.unshift(region);
       }
-      const { history, revision } = this.store_.document;
-      if (head !== history.head) this.store_.update(await this.client_.putHead(id, head, revision));
+      await go(head);
     } catch (error) {
       try {
         for (const region of accepted) await put(region, have);
+        await go(from);
       } catch {
         // Neither state is whole, so that no step fits what is there. The first refusal says why.
         this.forget();
