@@ -138,10 +138,10 @@ export function editorShortcuts(context: ShortcutContext): Shortcut[] {
     {
       group: "Transform",
       keys: "Esc",
-      label: "Cancel, leave the animation, leave the tool",
+      label: "Cancel, take the image away, leave the animation, leave the tool",
       matches: key("Escape"),
       run: () => {
-        if (bus.invoke("tool.cancel")) return;
+        if (bus.invoke("tool.cancel") || bus.invoke("image.dismiss")) return;
         if (bus.invoke("animation.current") !== null) {
           bus.invoke("animation.set", null);
           return;

@@ -87,7 +87,7 @@ export function createEditor(
     },
     () => player.set(null),
   );
-  const player = new Player(bus, (s) => source.showPart(s));
+  const player = new Player(bus, store, (s) => source.showPart(s));
   bus.on("load.changed", ({ complete }) => {
     loaded = complete;
   });
@@ -181,7 +181,7 @@ export function createEditor(
       }),
       createHistoryPanel(
         bus,
-        createPlayback(bus, client, store, (file) => void applyRecipeFile(bus, client, queue, store, file)),
+        createPlayback(bus, client, store, (file) => void applyRecipeFile(bus, client, store, regions, file)),
       ),
       transformPanel.foot,
     ),

@@ -57,6 +57,8 @@ export interface Notices {
   "session.changed": SessionDocument;
   "session.failed": Problem;
   "history.changed": History;
+  /** An edit of this page was recorded on top of this head. */
+  "edit.recorded": number;
   "tool.changed": ToolName;
   "brush.radius": number;
   "paint.changed": PaintSettings;
@@ -86,13 +88,17 @@ export interface Questions {
   "edit.jump": (edit: number) => Promise<void>;
   "edit.commit": () => Promise<void>;
   "edit.cancel": () => void;
+  /** Whether an edit waits to be recorded or dropped. */
+  "edit.pending": () => boolean;
   "brush.set": (radius: number) => void;
   "paint.settings": () => PaintSettings;
   "paint.set": (change: Partial<PaintSettings>) => void;
-  /** Shows the recorded edits part of the way; null goes back to the committed state. */
+  /** Shows the recorded edits part of the way, not while an edit is pending; null goes back to the committed state. */
   "animation.set": (s: number | null) => void;
   "animation.play": () => void;
   "animation.current": () => number | null;
+  /** Takes an image away that lies over the view; false where none does. */
+  "image.dismiss": () => boolean;
   "view.frame": () => void;
   "shortcuts.show": () => void;
 }

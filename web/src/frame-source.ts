@@ -205,7 +205,8 @@ export class FrameSource {
       if (!signal.aborted)
         reportError(this.bus_, error, part === null ? "This level could not be shown" : "No animation");
       this.newest_ = -1;
-      failed = true;
+      // Where it was left on purpose, another part may be wanted already.
+      failed = !signal.aborted;
     } finally {
       if (this.abort_ === abort) {
         this.loading_ = false;

@@ -42,13 +42,15 @@ function describeDetail(error: ProblemDetail): string {
 /** All that a problem says, one fact a line, for the person who reads it. */
 export function describeProblem(problem: Problem): string[] {
   const lines: string[] = [];
-  if (problem.detail && problem.detail !== problem.title) lines.push(problem.detail);
-  for (const error of problem.errors ?? []) lines.push(describeDetail(error));
+  const { title, detail, errors = [] } = problem;
+  // What a pointer names says it better.
+  if (detail && detail !== title && !errors.some((error) => error.detail === detail)) lines.push(detail);
+  for (const error of errors) lines.push(describeDetail(error));
   if (problem.limit !== undefined) {
     const actual = problem.actual === undefined ? "" : `, this is ${problem.actual.toLocaleString("en")}`;
     lines.push(`The limit is ${problem.limit.toLocaleString("en")}${actual}`);
   }
-  return lines;
+  return [...new Set(lines)];
 }
 
 /** Any thrown value as a problem. */

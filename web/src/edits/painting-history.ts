@@ -9,7 +9,8 @@ type Counts = Record<RegionName, { samples: number; operations: number }>;
 
 /** A change of the painting, with what it takes to go back and to come again. */
 interface Step {
-  /** The head of the edits at that time: undo goes back over edits and paintings in the order of the hand. */
+  /** The heads of the edits before and after it: undo goes back over edits and paintings in the order of the hand. */
+  headBefore: number;
   head: number;
   /** The regions that were painted; the other may have lost samples to them. */
   painted: readonly RegionName[];
@@ -33,7 +34,7 @@ const same = (a: Counts, b: Counts, what: "samples" | "operations"): boolean =>
 /**
  * Undo and redo of painting, for what was painted on this page. The server keeps a list of operations a region, records
  * some of them in another form than they were sent, and knows no undo of them: the lists are read back when they are wanted,
- * and put as they were. Every call runs within the command queue.
+ * and put as they were. A recipe, which brings edits and regions, is one step. Every call runs within the command queue.
  */
 export class PaintingHistory {
   private readonly client_: ApiClient;
@@ -49,7 +50,19 @@ export class PaintingHistory {
   /** Whether the next undo or redo at this head of the edits is one of painting. */
   get next(): { undo: boolean; redo: boolean } {
     const { head } = this.store_.document.history;
-    return { undo: this.done_.at(-1)?.head === head, redo: this.undone_.at(-1)?.head === head };
+    return { undo: this.done_.at(-1)?.head === head, redo: this.undone_.at(-1)?.headBefore === head };
+  }
+
+  /**
+   * An edit was recorded on top of the head: nothing is left to redo, and the edits behind that head are gone. What was
+   * painted under them is painted still, so it now counts as painted at that head.
+   */
+  edited(headBefore: number): void {
+    this.undone_.length = 0;
+    for (const step of this.done_) {
+      step.headBefore = Math.min(step.headBefore, headBefore);
+      step.head = Math.min(step.head, headBefore);
+    }
   }
 
   /**
@@ -78,9 +91,13 @@ export class PaintingHistory {
       if (now.revision !== document.revision) this.undone_.length = 0;
       if (now.revision !== document.revision + requests) this.done_.length = 0;
       else if (requests > 0) {
-        if (!same(before, after, "operations") || !same(before, after, "samples"))
+        const headBefore = document.history.head;
+        const { head } = now.history;
+        if (head !== headBefore) this.edited(headBefore);
+        if (head !== headBefore || !same(before, after, "operations") || !same(before, after, "samples"))
           this.done_.push({
-            head: now.history.head,
+            headBefore,
+            head,
             painted,
             before,
             after,
@@ -96,11 +113,11 @@ export class PaintingHistory {
     if (!(by < 0 ? this.next.undo : this.next.redo)) return "none";
     const step = from.at(-1);
     if (!step) return "none";
-    const [here, there] = by < 0 ? [step.after, step.before] : [step.before, step.after];
+    const [here, there, head] =
+      by < 0 ? [step.after, step.before, step.headBefore] : [step.before, step.after, step.head];
     const counts = countsOf(this.store_.document);
     if (!same(counts, here, "operations") || !same(counts, here, "samples")) {
-      this.done_.length = 0;
-      this.undone_.length = 0;
+      this.forget();
       return "stale";
     }
     if (by < 0) {
@@ -111,9 +128,24 @@ export class PaintingHistory {
         one: lists.one.slice(0, step.before.one.operations),
       };
     }
-    const lists = by < 0 ? step.listsBefore : step.listsAfter;
-    if (!lists) return "none";
-    const exact = await this.restore(step, lists, there);
+    const [have, wanted] = by < 0 ? [step.listsAfter, step.listsBefore] : [step.listsBefore, step.listsAfter];
+    if (!have || !wanted) return "none";
+    // The region that loses samples goes first, so that no sample is in the way of the other.
+    const gain = (region: RegionName): number => there[region].samples - here[region].samples;
+    const touched = (region: RegionName): boolean =>
+      step.painted.includes(region) ||
+      gain(region) !== 0 ||
+      there[region].operations !== here[region].operations;
+    const order = REGIONS.filter(touched).sort((a, b) => gain(a) - gain(b));
+    try {
+      await this.restore(order, wanted, have, head);
+    } catch (error) {
+      // The step stays, measured against what the server holds now.
+      if (by < 0) step.after = countsOf(this.store_.document);
+      else step.before = countsOf(this.store_.document);
+      throw error;
+    }
+    const exact = same(countsOf(this.store_.document), there, "samples");
     from.pop();
     // What follows is measured against what the server holds now.
     const now = countsOf(this.store_.document);
@@ -123,25 +155,45 @@ export class PaintingHistory {
     return exact ? "done" : "nearly";
   }
 
-  /**
-   * Puts the lists. Where samples changed hands between the regions, the order in which the lists are replayed matters: the
-   * orders are tried until both regions hold as many samples as they did.
-   */
-  private async restore(step: Step, lists: Lists, wanted: Counts): Promise<boolean> {
-    const others = REGIONS.filter((region) => !step.painted.includes(region));
-    const untouched = others.every((region) => step.before[region].samples === step.after[region].samples);
-    const orders = [
-      ...(untouched ? [step.painted] : []),
-      [...others, ...step.painted],
-      [...step.painted, ...others],
-      ...(others.length === 0 ? [[...step.painted].reverse()] : []),
-    ];
-    for (const order of orders) {
-      for (const region of order)
-        this.store_.update(await this.client_.putOperations(this.store_.id, region, lists[region]));
-      if (same(countsOf(this.store_.document), wanted, "samples")) return true;
+  /** Puts the lists and the head, all or nothing: where a part is refused, what was put before it goes back. */
+  private async restore(
+    order: readonly RegionName[],
+    wanted: Lists,
+    have: Lists,
+    head: number,
+  ): Promise<void> {
+    const { id } = this.store_;
+    const put = async (region: RegionName, lists: Lists): Promise<void> =>
+      this.store_.update(await this.client_.putOperations(id, region, lists[region]));
+    const from = this.store_.document.history.head;
+    const go = async (to: number): Promise<void> => {
+      const { history, revision } = this.store_.document;
+      if (to !== history.head) this.store_.update(await this.client_.putHead(id, to, revision));
+    };
+    const accepted: RegionName[] = [];
+    try {
+      // Lists are replayed on the surface as it is: on the one before a recipe's edits, both ways.
+      await go(Math.min(from, head));
+      for (const region of order) {
+        await put(region, wanted);
+        accepted.unshift(region);
+      }
+      await go(head);
+    } catch (error) {
+      try {
+        for (const region of accepted) await put(region, have);
+        await go(from);
+      } catch {
+        // Neither state is whole, so that no step fits what is there. The first refusal says why.
+        this.forget();
+      }
+      throw error;
     }
-    return false;
+  }
+
+  private forget(): void {
+    this.done_.length = 0;
+    this.undone_.length = 0;
   }
 
   private async read(): Promise<Lists> {

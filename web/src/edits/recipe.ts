@@ -1,15 +1,15 @@
 import type { ApiClient } from "../api/client";
 import { problemOf } from "../api/problem";
-import type { CommandQueue } from "../command-queue";
 import type { Bus, SessionStore } from "../session-store";
 import { reportChangedMeanwhile, reportError } from "./errors";
+import type { RegionEditor } from "./regions";
 
 /** Applies a recipe file's edits on top of what is there, as one change. */
 export async function applyRecipeFile(
   bus: Bus,
   client: ApiClient,
-  queue: CommandQueue,
   store: SessionStore,
+  regions: RegionEditor,
   file: Blob & { name: string },
 ): Promise<void> {
   let recipe: unknown;
@@ -24,10 +24,12 @@ export async function applyRecipeFile(
     return;
   }
   try {
-    await queue.enqueue(async () => {
-      store.update(await client.applyRecipe(store.id, recipe, store.document.revision));
+    await regions.applyRecipe(recipe);
+    bus.fire("toast", {
+      kind: "success",
+      title: `Applied ${file.name}`,
+      lines: ["The regions are those of the recipe now. Undo brings the ones before back."],
     });
-    bus.fire("toast", { kind: "success", title: `Applied ${file.name}` });
   } catch (error) {
     if (problemOf(error).status === 412) await reportChangedMeanwhile(bus, client, store);
     else reportError(bus, error, `${file.name} was not applied`);

@@ -1,10 +1,11 @@
 import type { ApiClient } from "../api/client";
+import { problemOf } from "../api/problem";
 import type { RegionName, RegionOperation, SessionDocument } from "../api/types";
 import type { CommandQueue } from "../command-queue";
 import type { Bus, SessionStore } from "../session-store";
 import { reportError } from "./errors";
 import type { PaintTarget } from "./paint-settings";
-import { PaintingHistory, REGIONS } from "./painting-history";
+import { PaintingHistory, REGIONS, type StepResult } from "./painting-history";
 
 export type Painted = SessionDocument & { changed: number };
 
@@ -41,7 +42,11 @@ export class RegionEditor {
     this.queue_ = queue;
     this.store_ = store;
     this.history_ = new PaintingHistory(client, store);
-    bus.on("session.changed", () => bus.fire("painting.history", this.history_.next));
+    bus.on("session.changed", () => this.tell());
+    bus.on("edit.recorded", (headBefore) => {
+      this.history_.edited(headBefore);
+      this.tell();
+    });
   }
 
   /** Adds operations to a region's painting; resolves with the session after the last, null where one was refused. */
@@ -93,10 +98,32 @@ export class RegionEditor {
     });
   }
 
+  /** Applies a recipe: its edits, and the regions of its last one instead of both; undone together. Throws where refused. */
+  async applyRecipe(recipe: unknown): Promise<void> {
+    try {
+      await this.queue_.enqueue(() =>
+        this.history_.record(REGIONS, true, async (take) =>
+          take(await this.client_.applyRecipe(this.store_.id, recipe, this.store_.document.revision)),
+        ),
+      );
+    } finally {
+      this.tell();
+    }
+  }
+
   /** Undoes (-1) or redoes (1) where that concerns the painting; false where it does not. Within the command queue. */
   async step(by: -1 | 1): Promise<boolean> {
-    const result = await this.history_.step(by);
-    this.bus_.fire("painting.history", this.history_.next);
+    let result: StepResult;
+    try {
+      result = await this.history_.step(by);
+    } catch (error) {
+      // A session that has moved on is the caller's to fetch.
+      if (problemOf(error).status === 412) throw error;
+      reportError(this.bus_, error, by < 0 ? "The painting was not undone" : "The painting was not redone");
+      return true;
+    } finally {
+      this.tell();
+    }
     if (result === "none") return false;
     if (result === "stale")
       this.bus_.fire("toast", {
@@ -108,7 +135,7 @@ export class RegionEditor {
       this.bus_.fire("toast", {
         kind: "info",
         title: "The painting is nearly as it was",
-        lines: ["Where the regions were painted over each other, the order of the strokes is not kept."],
+        lines: ["Someone else painted in between, or the regions were painted over each other."],
       });
     return true;
   }
@@ -125,7 +152,11 @@ export class RegionEditor {
       reportError(this.bus_, error, what);
       return null;
     } finally {
-      this.bus_.fire("painting.history", this.history_.next);
+      this.tell();
     }
+  }
+
+  private tell(): void {
+    this.bus_.fire("painting.history", this.history_.next);
   }
 }

@@ -98,6 +98,7 @@ export class TransformEditor {
     );
     bus.function("edit.commit", () => this.commit());
     bus.function("edit.cancel", () => this.cancel());
+    bus.function("edit.pending", () => this.pending);
     bus.on("session.changed", () => this.tell());
     bus.on("frame.applied", ({ sequence, revision }) => {
       // The recorded edit's frame may come before the answer that says so.
@@ -302,11 +303,12 @@ export class TransformEditor {
     if (!whole || !this.pending) return;
     await this.queue_.enqueue(async () => {
       await this.preview.idle();
-      const revision = this.store_.document.revision;
+      const { revision, history } = this.store_.document;
       this.committing_ = revision;
       try {
         const edit = this.body(whole);
         await this.client_.commitEdit(this.store_.id, edit, revision);
+        this.bus_.fire("edit.recorded", history.head);
         this.settle();
         this.store_.update(await this.client_.session(this.store_.id));
         this.bus_.fire("toast", { kind: "success", title: describeEdit(edit) });

@@ -4,7 +4,7 @@ import { reportError } from "../edits/errors";
 import { type MaskSettings, paintMask } from "../edits/image-mask";
 import type { RegionEditor } from "../edits/regions";
 import { cross, normalise } from "../math/vec3";
-import { placeRectangle } from "../scene/view-matrix";
+import { type PlaneRectangle, placeRectangle } from "../scene/view-matrix";
 import type { Viewport } from "../scene/viewport";
 import type { Bus, SessionStore } from "../session-store";
 import { h, setText } from "./dom";
@@ -20,6 +20,12 @@ const CHANNELS: readonly (readonly [ImageChannel, string])[] = [
   ["alpha", "Opacity"],
 ];
 const PREVIEW_PX = 240;
+const PNG_SIGNATURE = [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a];
+
+async function isPng(file: File): Promise<boolean> {
+  const start = new Uint8Array(await file.slice(0, PNG_SIGNATURE.length).arrayBuffer());
+  return PNG_SIGNATURE.every((byte, at) => start[at] === byte);
+}
 /** How the cloud's import report names coordinates of a texture. */
 const TEXTURE_ATTRIBUTE = "texcoord";
 
@@ -76,13 +82,30 @@ export function createImageForm(
     setText(part, `${Math.round(100 * bright)} % bright, ${Math.round(100 * dark)} % dark`);
   };
 
-  const place = (): void => {
-    const wanted = chosen !== null && by === "view" && holder.open;
-    if (!wanted || !chosen) {
-      placer?.remove();
-      placer = null;
-    } else placer ??= createImagePlacer(viewport.canvas.parentElement ?? document.body, chosen.bitmap);
+  const takeAway = (): void => {
+    placer?.remove();
+    placer = null;
+    const next = by === "view" ? "Lay the image over the view" : "Apply image";
+    setText(apply, next);
   };
+  /** Lays the image over the view where that is what places it; the view is looked at meanwhile, not painted. */
+  const place = (): void => {
+    if (!chosen || by !== "view" || !holder.open) {
+      takeAway();
+      return;
+    }
+    bus.invoke("tool.activate", "orbit");
+    placer ??= createImagePlacer(viewport.canvas.parentElement ?? document.body, chosen.bitmap);
+    setText(apply, "Apply image");
+  };
+  bus.on("tool.changed", (tool) => {
+    if (tool !== "orbit") takeAway();
+  });
+  bus.function("image.dismiss", () => {
+    const laid = placer !== null;
+    takeAway();
+    return laid;
+  });
   const drop = (): void => {
     chosen?.bitmap.close();
     chosen = null;
@@ -91,6 +114,10 @@ export function createImageForm(
   };
   const take = async (file: File): Promise<void> => {
     try {
+      if (!(await isPng(file))) {
+        bus.fire("toast", { kind: "error", title: `${file.name} is no PNG image` });
+        return;
+      }
       const bitmap = await createImageBitmap(file);
       drop();
       const shrink = Math.min(1, PREVIEW_PX / Math.max(bitmap.width, bitmap.height));
@@ -159,6 +186,7 @@ export function createImageForm(
     (value) => {
       by = value;
       face.element.hidden = by === "texture";
+      hint.hidden = by === "texture";
       place();
     },
   );
@@ -172,7 +200,8 @@ export function createImageForm(
     // Without the list there is the view to place it by.
     .catch(() => undefined);
 
-  const operation = (image: string, side: "above" | "below"): ShapeOperation => {
+  /** `laid`: where the image lies over the view; null: by the texture coordinates. */
+  const operation = (image: string, side: "above" | "below", laid: PlaneRectangle | null): ShapeOperation => {
     const shape: Omit<ImageShape, "projection"> = {
       type: "image",
       image,
@@ -180,27 +209,30 @@ export function createImageForm(
       threshold: mask.threshold,
       side,
     };
-    if (by === "texture" || !placer)
+    if (!laid)
       return {
         mode: "add",
         shape: { ...shape, projection: { type: "texture", repeat: false } },
         steal: true,
       };
-    const plane = viewport.focusPlane();
-    const { corner, size } = placer.place;
-    const { origin, u, v } = placeRectangle(plane, corner, size);
+    const { origin, u, v } = laid;
     const projection = { type: "planar", origin: store.toModel(origin), u, v } as const;
-    const towards = normalise(cross(plane.right, plane.up));
     return {
       mode: "add",
       shape: { ...shape, projection },
       steal: true,
-      ...(facing && { facing: towards }),
+      ...(facing && { facing: normalise(cross(u, v)) }),
     };
   };
   const send = async (): Promise<void> => {
     const image = chosen;
     if (!image) return;
+    if (by === "view" && !placer) {
+      place();
+      return;
+    }
+    // As it lies now: it may be moved while the image is sent.
+    const laid = placer && placeRectangle(viewport.focusPlane(), placer.place.corner, placer.place.size);
     try {
       image.id ??= (await client.uploadImage(image.file)).id;
     } catch (error) {
@@ -211,20 +243,26 @@ export function createImageForm(
     const changes: [RegionName, ShapeOperation][] =
       use === "both"
         ? [
-            ["zero", operation(id, "below")],
-            ["one", operation(id, "above")],
+            ["zero", operation(id, "below", laid)],
+            ["one", operation(id, "above", laid)],
           ]
         : [
             [
               use.startsWith("zero") ? "zero" : "one",
-              operation(id, use.endsWith("above") ? "above" : "below"),
+              operation(id, use.endsWith("above") ? "above" : "below", laid),
             ],
           ];
     const document = await regions.paintEach(changes);
+    if (document && document.changed > 0) takeAway();
     if (document?.changed === 0)
       bus.fire("toast", { kind: "info", title: "Nothing lies under the chosen part of the image" });
   };
   const apply = h("button", { type: "submit", class: "button" }, "Apply image");
+  const hint = h(
+    "p",
+    { class: "hint" },
+    "Drag the image over the view, size it by its corner, then apply. It is cast straight onto the surface: exact at the depth that the view turns about, shifted a little before and behind it.",
+  );
   const controls = h(
     "div",
     { class: "shape-fields", hidden: true },
@@ -235,7 +273,7 @@ export function createImageForm(
     uses.element,
     way.element,
     face.element,
-    h("p", { class: "hint" }, "Drag the image over the view, size it by its corner, then apply."),
+    hint,
     apply,
   );
   const form = h(

@@ -10,6 +10,17 @@ export interface ImagePlacer {
 
 const LEAST_PX = 16;
 const STEP_PX = 8;
+/** So much of the image stays within the picture, so that it can be taken hold of. */
+export const KEPT_PX = 32;
+
+/** The corner nearest to the wanted one that keeps some of the image within the room. */
+export function keptWithin(corner: Vec2, size: ScreenSize, room: ScreenSize): Vec2 {
+  const keep = (at: number, length: number, available: number): number => {
+    const kept = Math.min(KEPT_PX, length, available);
+    return Math.min(available - kept, Math.max(kept - length, at));
+  };
+  return [keep(corner[0], size.width, room.width), keep(corner[1], size.height, room.height)];
+}
 
 /** Lays a translucent image over the picture, to be moved by its face and sized by its corner, or by the arrow keys, + and -. */
 export function createImagePlacer(stage: HTMLElement, image: ImageBitmap): ImagePlacer {
@@ -32,6 +43,11 @@ export function createImagePlacer(stage: HTMLElement, image: ImageBitmap): Image
     grip,
   );
   const show = (): void => {
+    corner = keptWithin(
+      corner,
+      { width, height: width / aspect },
+      { width: stage.clientWidth, height: stage.clientHeight },
+    );
     Object.assign(element.style, {
       left: `${corner[0]}px`,
       top: `${corner[1]}px`,
@@ -87,10 +103,15 @@ export function createImagePlacer(stage: HTMLElement, image: ImageBitmap): Image
   });
   show();
   stage.append(element);
+  const resized = new ResizeObserver(show);
+  resized.observe(stage);
   return {
     get place() {
       return { corner, size: { width, height: width / aspect } };
     },
-    remove: () => element.remove(),
+    remove: () => {
+      resized.disconnect();
+      element.remove();
+    },
   };
 }

@@ -33,13 +33,19 @@ export function createPlayback(
     replaceChildren(play, icon(playing ? "pause" : "play"));
     play.setAttribute("aria-label", playing ? "Pause" : "Play the edits");
   });
-  const name = store.document.name.replace(/\.[^.]+$/, "") || "session";
+  bus.on("transform.changed", () => {
+    const pending = bus.invoke("edit.pending");
+    play.disabled = pending;
+    slider.input.disabled = pending;
+    player.title = pending ? "Apply or cancel the edit first" : "";
+  });
   const download = h(
     "a",
     {
       class: "button quiet",
       href: client.recipeUrl(store.id),
-      download: `${name}.recipe.json`,
+      // The server names the file.
+      download: "",
       data: { action: "recipe" },
     },
     icon("export"),

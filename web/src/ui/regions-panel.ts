@@ -111,7 +111,8 @@ function regionRow(
   );
   const show = (document: SessionDocument): void => {
     const { samples } = document.regions[region];
-    setText(count, samples === 0 ? "not painted" : `${formatCount(samples)} samples`);
+    setText(count, samples === 0 ? "not painted" : formatCount(samples));
+    count.title = samples === 0 ? "" : `${formatCount(samples)} samples`;
     clear.disabled = samples === 0;
     for (const button of buttons)
       button.disabled = samples === 0 && ["grow", "shrink"].includes(button.dataset["command"] ?? "");

@@ -88,6 +88,18 @@ test("a refusal becomes an error with all that the problem document says", async
   ]);
 });
 
+test("a problem is told without saying a thing twice", () => {
+  const problem = { type: "about:blank", title: "Refused", status: 422 };
+  const errors = [
+    { pointer: "/radius", detail: "must be positive" },
+    { pointer: "/radius", detail: "must be positive" },
+  ];
+  expect(describeProblem({ ...problem, detail: "Refused" })).toEqual([]);
+  expect(describeProblem({ ...problem, detail: "must be positive", errors })).toEqual([
+    "/radius: must be positive",
+  ]);
+});
+
 test("a stale revision is told with the current one", async () => {
   const { client } = clientAnswering(() =>
     json({ type: "/problems/stale", title: "Stale", status: 412, revision: 9 }, 412),

@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import type { SessionDocument } from "../../src/api/types";
 import { PLAY_MS, Player } from "../../src/edits/player";
-import type { Notices, Questions } from "../../src/event-map";
+import type { Notices, Questions, ToolName } from "../../src/event-map";
 import { Events } from "../../src/events";
 
 beforeEach(() => void vi.useFakeTimers());
@@ -9,12 +10,24 @@ afterEach(() => void vi.useRealTimers());
 function bench() {
   const bus = new Events<Notices, Questions>();
   const shown: (number | null)[] = [];
+  const state = { tool: "orbit" as ToolName, pending: false, document: { revision: 3 } as SessionDocument };
+  bus.function("tool.current", () => state.tool);
+  bus.function("tool.activate", (tool) => {
+    state.tool = tool;
+    bus.fire("tool.changed", tool);
+  });
+  bus.function("edit.pending", () => state.pending);
+  const move = (revision: number): void => {
+    state.document = { revision } as SessionDocument;
+    bus.fire("session.changed", state.document);
+  };
   const player = new Player(
     bus,
+    state,
     (s) => shown.push(s),
     () => Date.now(),
   );
-  return { bus, shown, player };
+  return { bus, shown, player, state, move };
 }
 
 test("a part is shown and left again; leaving what is not shown tells nothing", () => {
@@ -55,5 +68,47 @@ test("taking up a tool leaves it", () => {
   bus.fire("tool.changed", "one");
   vi.advanceTimersByTime(1000);
   expect(shown).toEqual([0, null]);
+  expect(bus.invoke("animation.current")).toBeNull();
+});
+
+test("entering it lays the tool down", () => {
+  const { bus, shown, state } = bench();
+  bus.invoke("tool.activate", "zero");
+  bus.invoke("animation.set", 0.5);
+  expect(state.tool).toBe("orbit");
+  expect(shown).toEqual([0.5]);
+  bus.invoke("tool.activate", "move");
+  expect(shown).toEqual([0.5, null]);
+  bus.invoke("animation.play");
+  expect(state.tool).toBe("orbit");
+  expect(shown).toEqual([0.5, null, 0]);
+});
+
+test("it is not entered while an edit is pending, and left where one begins", () => {
+  const { bus, shown, state, player } = bench();
+  state.pending = true;
+  bus.invoke("animation.set", 0.5);
+  bus.invoke("animation.play");
+  expect(player.playing).toBe(false);
+  expect(shown).toEqual([]);
+  state.pending = false;
+  bus.invoke("animation.set", 0.5);
+  state.pending = true;
+  bus.fire("transform.changed", {} as Notices["transform.changed"]);
+  expect(shown).toEqual([0.5, null]);
+});
+
+test("any change of the session leaves it, the same session told again does not", () => {
+  const { bus, shown, move, player } = bench();
+  bus.invoke("animation.set", 0.5);
+  move(3);
+  expect(shown).toEqual([0.5]);
+  move(4);
+  expect(shown).toEqual([0.5, null]);
+  bus.invoke("animation.play");
+  move(4);
+  expect(player.playing).toBe(true);
+  move(5);
+  expect(player.playing).toBe(false);
   expect(bus.invoke("animation.current")).toBeNull();
 });

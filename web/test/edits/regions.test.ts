@@ -1,13 +1,19 @@
 import { expect, test } from "vitest";
 import { ApiClient } from "../../src/api/client";
-import type { RegionName, RegionOperation } from "../../src/api/types";
+import type { EditBody, RegionName, RegionOperation } from "../../src/api/types";
 import { CommandQueue } from "../../src/command-queue";
+import { HistoryEditor } from "../../src/edits/history";
 import { DEFAULT_PAINT, modeOf } from "../../src/edits/paint-settings";
 import { RegionEditor } from "../../src/edits/regions";
 import type { Notices, Questions } from "../../src/event-map";
 import { Events } from "../../src/events";
 import { SessionStore } from "../../src/session-store";
 import { MockSession } from "../mock/session";
+
+const EDIT = {
+  level: 0,
+  deformation: { type: "translation", vector: [0, 0, 1] },
+} as const satisfies EditBody;
 
 /** An editor over a row of ten samples along x, and the session behind it. */
 function bench() {
@@ -18,7 +24,8 @@ function bench() {
     normals: new Float32Array(3 * count),
     detail: new Float32Array(count),
   });
-  const fault = { next: false };
+  /** Of puts: how many are accepted before one is refused. */
+  const fault = { next: false, puts: Number.POSITIVE_INFINITY };
   const client = new ApiClient("http://host/", async (url, init) => {
     const [, , , , region, operations] = new URL(url).pathname.split("/");
     const name = region === "regions" ? (operations as RegionName) : "zero";
@@ -26,6 +33,25 @@ function bench() {
     if (fault.next)
       return new Response(JSON.stringify({ title: "No", type: "/problems/x", status: 422 }), { status: 422 });
     const answer = (body: unknown) => new Response(JSON.stringify(body));
+    if (region === "edits") return answer({ head: session.head, edits: session.edits });
+    if (region === "head") {
+      session.head = JSON.parse(String(init?.body)).edit;
+      session.revision += 1;
+      return answer(session.document());
+    }
+    if (region === "recipe") {
+      // Two edits and both regions, as one change.
+      session.commit(EDIT);
+      session.commit(EDIT);
+      session.put("zero", [ball(0, 0.5)]);
+      session.put("one", [ball(9, 0.5)]);
+      session.revision = store.document.revision + 1;
+      return answer(session.document());
+    }
+    if (method === "PUT" && fault.puts-- === 0)
+      return new Response(JSON.stringify({ title: "Too large", type: "/problems/x", status: 413 }), {
+        status: 413,
+      });
     if (method === "GET") return answer({ operations: session.operations[name] });
     const body = init?.body ? JSON.parse(String(init.body)) : null;
     if (method === "POST") {
@@ -43,9 +69,18 @@ function bench() {
     next = told;
   });
   const store = new SessionStore(bus, session.document());
-  const regions = new RegionEditor(bus, client, new CommandQueue(), store);
+  const queue = new CommandQueue();
+  const regions = new RegionEditor(bus, client, queue, store);
+  new HistoryEditor(bus, client, queue, store, regions);
+  /** What the transforms do at their end. */
+  const edit = (): void => {
+    const { head } = store.document.history;
+    session.commit(EDIT);
+    bus.fire("edit.recorded", head);
+    store.update(session.document());
+  };
   const marks = (): string => [...session.marks].join("");
-  return { session, store, regions, marks, toasts, fault, next: () => next };
+  return { bus, session, store, regions, edit, marks, toasts, fault, next: () => next };
 }
 
 const ball = (x: number, radius: number, mode: "add" | "remove" = "add"): RegionOperation => ({
@@ -151,4 +186,80 @@ test("held keys go before the buttons, and only outlines keep", () => {
   expect(modeOf({ ...DEFAULT_PAINT, mode: "remove" }, "one", none)).toBe("remove");
   expect(modeOf(DEFAULT_PAINT, "one", { ...none, altKey: true })).toBe("add");
   expect(modeOf(lasso, "erase", { ...none, altKey: true })).toBe("remove");
+});
+
+test("edit, paint, jump to the start, other edit: undo takes the edit back, then the painting", async () => {
+  const { bus, session, regions, edit, marks, toasts } = bench();
+  await regions.paint("zero", [ball(8, 0.5)]);
+  edit();
+  await regions.paint("one", [ball(2, 1.5)]);
+  await bus.invoke("edit.jump", 0);
+  edit();
+  const painted = marks();
+  await bus.invoke("edit.undo");
+  expect([session.head, marks()]).toEqual([0, painted]);
+  // What was painted under the edit that is gone stands in its place, and goes before what was painted earlier.
+  await bus.invoke("edit.undo");
+  expect(marks()).toBe("0000000010");
+  await bus.invoke("edit.undo");
+  expect(marks()).toBe("0000000000");
+  for (const expected of ["0000000010", painted]) {
+    await bus.invoke("edit.redo");
+    expect([session.head, marks()]).toEqual([0, expected]);
+  }
+  await bus.invoke("edit.redo");
+  expect([session.head, marks()]).toEqual([1, painted]);
+  expect(toasts).toEqual([]);
+});
+
+test("edit, paint, undo, undo, other edit: nothing is left to redo", async () => {
+  const { bus, session, regions, edit, marks, next } = bench();
+  edit();
+  await regions.paint("one", [ball(2, 1.5)]);
+  await bus.invoke("edit.undo");
+  await bus.invoke("edit.undo");
+  expect([session.head, marks()]).toEqual([0, "0000000000"]);
+  edit();
+  expect(next()).toEqual({ undo: false, redo: false });
+  await bus.invoke("edit.redo");
+  expect([session.head, marks()]).toEqual([1, "0000000000"]);
+});
+
+test("a recipe is undone and redone as a whole, its regions with its edits", async () => {
+  const { bus, session, regions, edit, marks, toasts, next } = bench();
+  edit();
+  await regions.paint("one", [ball(2, 1.5)]);
+  await regions.applyRecipe({});
+  expect([session.head, marks()]).toEqual([3, "1000000002"]);
+  expect(next()).toEqual({ undo: true, redo: false });
+  await bus.invoke("edit.undo");
+  expect([session.head, marks()]).toEqual([1, "0222000000"]);
+  await bus.invoke("edit.redo");
+  expect([session.head, marks()]).toEqual([3, "1000000002"]);
+  await bus.invoke("edit.undo");
+  await bus.invoke("edit.undo");
+  expect([session.head, marks()]).toEqual([1, "0000000000"]);
+  await bus.invoke("edit.undo");
+  expect(session.head).toBe(0);
+  expect(toasts).toEqual([]);
+});
+
+test("an undo whose second half is refused changes nothing, says why, and can be tried again", async () => {
+  const { bus, regions, fault, marks, toasts, next } = bench();
+  await regions.paint("one", [ball(2, 1.5)]);
+  await regions.paint("zero", [ball(3, 1.5)]);
+  expect(marks()).toBe("0211100000");
+  fault.puts = 1;
+  await bus.invoke("edit.undo");
+  expect(marks()).toBe("0211100000");
+  expect(toasts).toEqual(["The painting was not undone: Too large"]);
+  expect(next().undo).toBe(true);
+  await bus.invoke("edit.undo");
+  expect(marks()).toBe("0222000000");
+  fault.puts = 1;
+  await bus.invoke("edit.redo");
+  expect(marks()).toBe("0222000000");
+  await bus.invoke("edit.redo");
+  expect(marks()).toBe("0211100000");
+  expect(toasts.length).toBe(2);
 });
