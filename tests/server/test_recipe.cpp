@@ -386,13 +386,13 @@ TEST_CASE("recipes of sessions that are not ready are refused") {
         return Error{.code = ErrorCode::kEmptyCloud, .message = "no", .field = {}};
       });
   REQUIRE(comes_true([&] { return failed->document()->state == protocol::SessionState::kFailed; }));
-  CHECK(kind_of(export_recipe(*failed)) == ProblemKind::kWrongState);
+  CHECK(kind_of(export_recipe(*failed, 1ULL << 30U)) == ProblemKind::kWrongState);
   CHECK(kind_of(apply_recipe(*failed, {}, {})) == ProblemKind::kWrongState);
   CHECK(kind_of(partial_picture(*failed, 0, {}, false)) == ProblemKind::kWrongState);
   const auto closed = workshop.painted();
   commit(*closed, lift(0.1));
   const auto recipe = request_of(exported(*closed));
   closed->close("gone");
-  CHECK(kind_of(export_recipe(*closed)) == ProblemKind::kNotFound);
+  CHECK(kind_of(export_recipe(*closed, 1ULL << 30U)) == ProblemKind::kNotFound);
   CHECK(kind_of(apply_recipe(*closed, recipe, {})) == ProblemKind::kNotFound);
 }
