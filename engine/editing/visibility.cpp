@@ -182,7 +182,7 @@ class DepthPyramid {
       const auto i = static_cast<Eigen::Index>(axis);
       const double wanted = size[i] / (scene.half_sum[i] / scene.count) * kTexelsPerRadius;
       side[axis] = wanted >= 1.0 ? static_cast<std::size_t>(std::min(wanted, double{kMaxTexels})) : 1;
-      // A narrow outline is one texel wide: as wide as the texels of a broad one, so that discs cover it alike.
+      // A narrow outline is one texel wide, and that as wide as those of a broad one: discs cover it alike.
       const double least = scene.half_sum[i] / scene.count / kTexelsPerRadius;
       texel_[i] = std::max(size[i] / static_cast<double>(side[axis]), least);
       if (!(texel_[i] > 0.0)) texel_[i] = 1.0;

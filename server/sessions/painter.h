@@ -21,8 +21,8 @@ class Painter {
   Painter(const SessionParams& params, const PaintSurface& surface, const Painting& zero,
           const Painting& one);
 
-  /// Paints what the operation resolves to (engine/editing/resolved_painting.h) and records it. What it steals
-  /// is recorded as removed from the other region, the rest without stealing.
+  /// Paints what the operation resolves to (engine/editing/resolved_painting.h) and records it. What it
+  /// steals is recorded as removed from the other region, the rest without stealing.
   /// Pre:      the operation is valid and its image or model was found
   /// Problems: too many operations or vertices; marks and recording must then be dropped
   /// Cancels:  the same
