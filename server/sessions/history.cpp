@@ -17,7 +17,7 @@ constexpr std::uint64_t kStepsPerWhole = 4;
 /// Steps that were dropped have no memory any more: after so many edits a whole state is kept in any case.
 constexpr std::size_t kEditsPerWhole = 64;
 /// Steps and whole states have room for so many surfaces, however much the paintings take.
-constexpr std::uint64_t kLeastSurfaces = 3;
+constexpr std::uint64_t kLeastSurfaces = 4;
 /// A replay of n edits leaves whole states n / 2, n / 4 and n / 8 edits before its end: going on in the same
 /// direction replays less and less. Of shorter ways than this it leaves none.
 constexpr std::size_t kLeastReplay = 8;
@@ -194,7 +194,7 @@ void History::push(std::shared_ptr<const RecordedEdit> edit, SurfaceState after)
   current_ = std::move(after);
   derived_ = false;
   if (pays_whole(head_)) nodes_[head_].whole = current_;
-  trim();
+  trim(head_);
 }
 
 void History::replace_current(SurfaceState derived) {
@@ -204,7 +204,7 @@ void History::replace_current(SurfaceState derived) {
   node.derived_reports = derived.reports;
   current_ = std::move(derived);
   derived_ = true;
-  trim();
+  trim(head_);
 }
 
 std::vector<History::Start> History::starts() const {
@@ -245,13 +245,12 @@ Result<void> History::move_head(std::size_t edit) {
     least = *cost;
   }
   const auto given_up = [this](const Error& error) {
-    trim();  // what was replayed so far is kept where there is room
+    trim(head_);  // what was replayed so far is kept where there is room
     return error;
   };
   Walk walk(nodes_, *best);  // from the rest there always is a way
   while (walk.place().node > edit) walk.step_back();
   const std::size_t start = walk.place().node;
-  std::size_t oldest = start + 1;
   while (walk.place().node < edit) {
     const std::size_t from = walk.place().node;
     if (!walk.turn_to_next()) {
@@ -268,8 +267,7 @@ Result<void> History::move_head(std::size_t edit) {
     nodes_[from + 1].step =
         std::make_shared<const SurfaceDelta>(*walk.state().surface, *next.value().surface);
     walk.jump(std::move(next).value(), {.node = from + 1, .derived = false});
-    // The steps behind are renewed as far as there is room; those nearest to where the way ends stay.
-    while (memory() > budget() && oldest <= from) nodes_[oldest++].step.reset();
+    trim(edit);  // at every step: a long way must not take more memory than a short one
     const std::size_t left = edit - from - 1;
     if (left >= kLeastReplay && std::has_single_bit(left) && left * 8 >= edit - start)
       nodes_[from + 1].whole = walk.state();
@@ -277,7 +275,7 @@ Result<void> History::move_head(std::size_t edit) {
   head_ = edit;
   derived_ = walk.place().derived;
   current_ = !derived_ && nodes_[edit].whole ? *nodes_[edit].whole : walk.release();
-  trim();
+  trim(head_);
   return {};
 }
 
@@ -308,7 +306,7 @@ History::Known History::nearest_known(std::size_t edit) const {
   return {.edit = farthest, .state = walk.release()};
 }
 
-History::Victim History::cheapest_to_lose() const {
+History::Victim History::cheapest_to_lose(std::size_t center) const {
   Victim least;
   const auto consider = [&](Victim::Kind kind, std::size_t node, double cost, std::size_t away,
                             std::uint64_t bytes) {
@@ -320,7 +318,7 @@ History::Victim History::cheapest_to_lose() const {
   std::size_t lost = 0;          // steps between it and the node that are not kept
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const Node& node = nodes_[i];
-    const std::size_t away = std::max<std::size_t>(1, i <= head_ ? head_ - i + 1 : i - head_);
+    const std::size_t away = std::max<std::size_t>(1, i <= center ? center - i + 1 : i - center);
     if (node.step) consider(Victim::Kind::kStep, i, 1.0, away, node.step->memory());
     if (i > 0 && !node.step) ++lost;
     if (node.derivation && !(i == head_ && derived_)) {
@@ -355,11 +353,11 @@ std::uint64_t History::budget() const {
   return std::max(budget_bytes_, marks_memory() + least);
 }
 
-void History::trim() {
+void History::trim(std::size_t center) {
   // What is cheapest to lose goes first: what it costs to get back, for each byte, weighed by how far from
-  // the head it is. So the last edits stay at hand, and whole states thin out with their distance.
+  // the center it is. So the last edits stay at hand, and whole states thin out with their distance.
   while (memory() > budget()) {
-    const Victim victim = cheapest_to_lose();
+    const Victim victim = cheapest_to_lose(center);
     Node& node = nodes_[victim.node];
     if (victim.kind == Victim::Kind::kNone) return;
     if (victim.kind == Victim::Kind::kStep) node.step.reset();

@@ -91,8 +91,8 @@ class History {
   [[nodiscard]] std::optional<double> cost_of_way(Place from, std::size_t edit) const;
   [[nodiscard]] bool pays_whole(std::size_t node) const;
   [[nodiscard]] std::uint64_t budget() const;
-  void trim();
-  [[nodiscard]] Victim cheapest_to_lose() const;
+  void trim(std::size_t center);
+  [[nodiscard]] Victim cheapest_to_lose(std::size_t center) const;
   [[nodiscard]] std::uint64_t states_memory() const;
   [[nodiscard]] std::uint64_t marks_memory() const;
 

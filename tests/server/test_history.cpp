@@ -262,7 +262,7 @@ TEST_CASE("while a replay runs, the steps behind it are dropped where there is n
 }
 
 TEST_CASE("paintings that fill the budget leave room for the last steps") {
-  Bench bench(3 * kWhole);
+  Bench bench(4 * kWhole);
   for (std::size_t i = 0; i < 300; ++i)
     bench.push(static_cast<std::uint32_t>(kBands), 100, std::make_shared<Marks>(kSamples, std::uint8_t{1}));
   bench.replays = 0;
