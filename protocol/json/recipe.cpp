@@ -41,8 +41,10 @@ void require_text(ObjectReader& object, std::string_view name, std::string_view 
   const Json* const member = object.required(name);
   if (member == nullptr) return;
   const auto text = read_string(*member, object.pointer_to(name), object.errors());
-  if (text && *text != expected)
-    object.errors().add(object.pointer_to(name), "must be \"" + std::string(expected) + "\"");
+  if (!text || *text == expected) return;
+  std::string detail = "must be ";
+  detail += to_text(JsonDocument(expected));
+  object.errors().add(object.pointer_to(name), std::move(detail));
 }
 
 void require_version(ObjectReader& object) {
@@ -107,8 +109,11 @@ Parsed<RecipeRequest> parse_recipe_request(const Json& document) {
 std::string recipe_head(const std::vector<double>& level_scales) {
   JsonDocument scales = JsonDocument::array();
   for (const double scale : level_scales) scales.push_back(checked_number(scale));
-  return "{\"format\":\"" + std::string(kRecipeFormat) + "\",\"version\":" + std::to_string(kRecipeVersion) +
-         ",\"level_scales\":" + scales.dump() + ",\"edits\":[\n";
+  std::string text = to_text(JsonDocument{
+      {"format", kRecipeFormat}, {"version", kRecipeVersion}, {"level_scales", std::move(scales)}});
+  text.back() = ',';  // the document goes on
+  text += "\"edits\":[\n";
+  return text;
 }
 
 std::string_view recipe_tail() {
