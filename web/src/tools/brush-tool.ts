@@ -7,6 +7,7 @@ import { ONE_COLOR, ZERO_COLOR } from "../scene/region-colors";
 import type { Viewport } from "../scene/viewport";
 import type { SessionStore } from "../session-store";
 import type { PaintGesture } from "./paint-tool";
+import { hearPresses } from "./presses";
 import { isDepthJump, isNewVertex, strokeOperation } from "./stroke";
 
 type Color = readonly [number, number, number];
@@ -57,12 +58,9 @@ export class BrushTool implements PaintGesture {
 
   activate(target: PaintTarget): void {
     this.target_ = target;
-    this.listeners_ = new AbortController();
+    const { canvas } = this.viewport_;
+    this.listeners_ = hearPresses(canvas, this.down);
     const { signal } = this.listeners_;
-    const canvas = this.viewport_.canvas;
-    // On the way down to the canvas, so that a press on the surface paints and never reaches the camera.
-    const holder = canvas.parentElement ?? canvas;
-    holder.addEventListener("pointerdown", this.down, { signal, capture: true });
     canvas.addEventListener("pointermove", this.move, { signal });
     canvas.addEventListener("pointerup", this.up, { signal });
     canvas.addEventListener("pointercancel", this.abandon, { signal });

@@ -6,6 +6,7 @@ import { ONE_COLOR, ZERO_COLOR } from "../scene/region-colors";
 import type { Viewport } from "../scene/viewport";
 import type { Bus, SessionStore } from "../session-store";
 import type { PaintGesture } from "./paint-tool";
+import { hearPresses } from "./presses";
 
 /** The flood that the settings ask for, from a seed in model space. */
 export function floodOperation(seed: Vec3, settings: PaintSettings): FloodOperation {
@@ -44,11 +45,9 @@ export class FloodTool implements PaintGesture {
 
   activate(target: PaintTarget): void {
     this.target_ = target;
-    this.listeners_ = new AbortController();
-    const { signal } = this.listeners_;
     const { canvas } = this.viewport_;
-    const holder = canvas.parentElement ?? canvas;
-    holder.addEventListener("pointerdown", this.down, { signal, capture: true });
+    this.listeners_ = hearPresses(canvas, this.down);
+    const { signal } = this.listeners_;
     canvas.addEventListener("pointermove", this.move, { signal });
     canvas.addEventListener("pointerleave", () => this.viewport_.setRing(null), { signal });
   }

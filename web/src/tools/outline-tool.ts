@@ -10,6 +10,7 @@ import type { Bus, SessionStore } from "../session-store";
 import type { BrushSize } from "./brush-tool";
 import { ellipseOutline, ellipseWithin, lineOutline, polygonOutline, rectangleCorners } from "./outline";
 import type { PaintGesture } from "./paint-tool";
+import { hearPresses } from "./presses";
 
 export type OutlineMethod = "lasso" | "polygon" | "rectangle" | "ellipse" | "line";
 
@@ -66,12 +67,9 @@ export class OutlineTool implements PaintGesture {
 
   activate(target: PaintTarget): void {
     this.target_ = target;
-    this.listeners_ = new AbortController();
-    const { signal } = this.listeners_;
     const { canvas } = this.viewport_;
-    // On the way down to the canvas, so that the camera never sees a press that draws.
-    const holder = canvas.parentElement ?? canvas;
-    holder.addEventListener("pointerdown", this.down, { signal, capture: true });
+    this.listeners_ = hearPresses(canvas, this.down);
+    const { signal } = this.listeners_;
     canvas.addEventListener("pointermove", this.move, { signal });
     canvas.addEventListener("pointerup", this.up, { signal });
     canvas.addEventListener("pointercancel", () => this.cancel(), { signal });
