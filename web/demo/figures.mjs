@@ -1,5 +1,5 @@
 // Two figures of the paper, made through the public HTTP API and the real viewer: the elementary deformations of Figure 5, and
-// the embossed plate of Figure 10 that is bent on one resolution and on several. `make figures` builds what it needs and runs it.
+// the embossed plate of Figure 10 that is lifted on one resolution and on several. `make figures` builds what it needs and runs it.
 import { mkdirSync, rmSync } from "node:fs";
 import { resolve } from "node:path";
 import { launchBrowser } from "../scripts/browser.mjs";
@@ -84,7 +84,7 @@ async function lettering() {
     const page = await browser.newPage({ viewport: { width: 1024, height: 1024 } });
     await page.setContent(
       '<body style="margin:0;background:#000;color:#fff;display:grid;place-items:center;height:100vh;text-align:center;' +
-        'font:bold 230px/1.05 sans-serif"><div>Point<br>wright</div></body>',
+        'font:bold 250px/1.1 sans-serif"><div style="filter:blur(7px)">Point<br>wright</div></body>',
     );
     return await page.screenshot({ type: "png" });
   } finally {
@@ -92,7 +92,7 @@ async function lettering() {
   }
 }
 
-/** Bright pixels move up, dark ones stay: the letters are embossed by a translation. Then the plate is bent. */
+/** Bright pixels move up, dark ones stay: the letters are embossed by a translation. Then the plate is lifted at one side. */
 async function embossedPlate(url) {
   const cloud = await upload(url, "Embossed plate", ply, plate(side));
   const session = await openSession(url, { cloud: cloud.id, name: "Figure 10", scales: [0.06] });
@@ -108,28 +108,29 @@ async function embossedPlate(url) {
       projection: { type: "texture", repeat: false },
     },
   });
-  await put(url, session, "zero", [letters(0.2, "below")]);
-  await put(url, session, "one", [letters(0.8, "above")]);
+  await put(url, session, "zero", [letters(0.12, "below")]);
+  await put(url, session, "one", [letters(0.88, "above")]);
   const above = { position: [0.2, -1.9, 2.5], target: [0, 0, 0], up: [0, 0, 1] };
   const file = (name) => resolve(out, `${name}.png`);
   await takePicture(url, session.id, file("letters"), { camera: above, mode: "regions", size });
   const finest = session.levels.length - 1;
-  await commit(url, session, { level: finest, deformation: { type: "translation", vector: [0, 0, 0.05] } });
+  await commit(url, session, { level: finest, deformation: { type: "translation", vector: [0, 0, 0.09] } });
   await takePicture(url, session.id, file("embossed"), { camera: above, mode: "shaded", size });
 
   const half = (sign, x) => ({
     mode: "add",
     shape: { type: "half_space", point: [sign * x, 0, 0], normal: [sign, 0, 0] },
   });
-  await put(url, session, "zero", [half(-1, 0.9)]);
-  await put(url, session, "one", [half(1, 0.9)]);
-  const bend = { type: "rotation", axis: { point: [0, 0, 1.1], direction: [0, -1, 0] }, angle_deg: 95 };
-  const beside = { position: [2.1, -1.1, 1.9], target: [0.25, 0, 0.35], up: [0, 0, 1] };
+  await put(url, session, "zero", [half(-1, 0.85)]);
+  await put(url, session, "one", [half(1, 0.85)]);
+  // Straight up, off the slope's normal: where one resolution moves the letters with it, they lean.
+  const lift = { type: "translation", vector: [0, 0, 1.3] };
+  const beside = { position: [0.15, -2.6, 1.55], target: [0.05, -0.1, 0.6], up: [0, 0, 1] };
   for (const [name, level] of [
     ["single-resolution", finest],
     ["multiresolution", 0],
   ]) {
-    await commit(url, session, { level, deformation: bend });
+    await commit(url, session, { level, deformation: lift });
     await takePicture(url, session.id, file(name), { camera: beside, mode: "shaded", size });
     await call(url, "PUT", `${session.path}/head`, { json: { edit: 1 } });
   }
@@ -152,8 +153,11 @@ const daemon = await startDaemon(["--web", resolve(root, "web/dist")]);
 for (const signal of ["SIGINT", "SIGTERM"])
   process.once(signal, () => daemon.stop().then(() => process.exit(130)));
 try {
-  await step("Figure 5", () => elementaryDeformations(daemon.url));
-  await step("Figure 10", () => embossedPlate(daemon.url));
+  const wanted = process.argv.slice(2); // numbers of figures; none: all
+  const figures = { 5: elementaryDeformations, 10: embossedPlate };
+  for (const [number, make] of Object.entries(figures))
+    if (wanted.length === 0 || wanted.includes(number))
+      await step(`Figure ${number}`, () => make(daemon.url));
 } catch (error) {
   console.error(`figures: ${error.message}\n${daemon.log().split("\n").slice(-10).join("\n")}`);
   process.exitCode = 1;
