@@ -70,6 +70,15 @@ Cloud in_caller_order(const Cloud& cloud) {
   return permuted(cloud, order);
 }
 
+std::uint64_t memory_of(const Cloud& cloud) {
+  std::uint64_t bytes = (cloud.position.size() + cloud.normal.size()) * 3 * sizeof(float);
+  bytes += cloud.color.size() * sizeof(Rgba) + cloud.texcoord.size() * sizeof(TexCoord);
+  bytes += cloud.id.size() * sizeof(std::uint32_t) + cloud.exact_position.size() * 3 * sizeof(double);
+  for (const ScalarAttribute& scalar : cloud.scalars)
+    bytes += std::visit([](const auto& values) { return values.size() * sizeof(values[0]); }, scalar.values);
+  return bytes;
+}
+
 Result<void> validate(const Cloud& cloud) {
   const std::size_t n = cloud.size();
   const auto wrong = [n](std::size_t size, bool optional) { return size != n && !(optional && size == 0); };
@@ -82,14 +91,13 @@ Result<void> validate(const Cloud& cloud) {
   for (const ScalarAttribute& scalar : cloud.scalars) {
     if (wrong(scalar.size(), false)) return malformed(scalar.name.c_str(), n, scalar.size());
   }
-  std::vector<bool> seen(n, false);
-  for (const std::uint32_t id : cloud.id) {
-    if (id >= n || seen[id]) {
-      return Error{.code = ErrorCode::kMalformedData,
-                   .message = "the sample ids are not a permutation",
-                   .field = "id"};
-    }
-    seen[id] = true;
+  std::vector<std::uint32_t> ids = cloud.id;
+  if (!std::is_sorted(ids.begin(), ids.end())) std::sort(ids.begin(), ids.end());
+  const auto twice = std::adjacent_find(ids.begin(), ids.end());
+  if (twice != ids.end()) {
+    return Error{.code = ErrorCode::kMalformedData,
+                 .message = "two samples have the id " + std::to_string(*twice),
+                 .field = "id"};
   }
   for (std::size_t i = 0; i < n; ++i) {
     if (!cloud.position[i].allFinite()) {

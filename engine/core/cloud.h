@@ -39,7 +39,8 @@ struct Cloud {
   bool color_has_alpha = false;
   std::vector<TexCoord> texcoord;        ///< empty, or N
   std::vector<ScalarAttribute> scalars;  ///< every further property of the file, by name
-  /// Stable id of each sample: its index in the caller's order. A permutation of 0..N-1.
+  /// Stable id of each sample: its index in the caller's order, all distinct; those of samples that were
+  /// inserted afterwards follow.
   std::vector<std::uint32_t> id;
   /// The positions as the file had them, 3 per sample, where origin + position does not give them back to the
   /// bit (double-precision files, and float files that lie far from zero). Empty where it does.
@@ -62,7 +63,10 @@ Cloud permuted(const Cloud& cloud, const std::vector<std::uint32_t>& order);
 /// The cloud in its caller's order (ascending id). Cost: O(N).
 Cloud in_caller_order(const Cloud& cloud);
 
-/// Column lengths agree, ids are a permutation, every position is finite. Errors: kMalformedData, kNonFinite.
+/// Bytes that the columns take.
+std::uint64_t memory_of(const Cloud& cloud);
+
+/// Column lengths agree, ids are distinct, every position is finite. Errors: kMalformedData, kNonFinite.
 Result<void> validate(const Cloud& cloud);
 
 }  // namespace pointwright

@@ -110,6 +110,9 @@ Result<void> validate(const EditParams& params, const MultiresSurface& surface) 
   }
   if (auto gains = validate(ReconstructParams{.level = params.level, .gains = params.gains}, surface); !gains)
     return gains;
+  if (params.resampling) {
+    if (auto valid = validate(*params.resampling); !valid) return valid;
+  }
   return validate(params.deformation);
 }
 

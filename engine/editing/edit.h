@@ -2,10 +2,12 @@
 // One edit: deform level k, put the detail back (§4, Eq. 5).
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "engine/core/result.h"
 #include "engine/editing/deformation.h"
+#include "engine/editing/resampling_params.h"
 #include "engine/editing/scale_field.h"
 #include "engine/multires/surface.h"
 #include "engine/spatial/neighbor_graph.h"
@@ -22,6 +24,9 @@ struct EditParams {
   /// What multiplies the detail of each band where t = 1, 1 + t (g - 1) elsewhere; one for each band of the
   /// surface, of which those below `level` do not count, each within [-16, 16]. Empty: 1 everywhere.
   std::vector<float> gains;
+  /// Samples are inserted where the deformation stretches the surface (engine/resampling); none: the samples
+  /// stay the same ones.
+  std::optional<ResamplingParams> resampling = std::nullopt;
 
   friend bool operator==(const EditParams&, const EditParams&) = default;
 };

@@ -7,15 +7,6 @@ namespace pointwright::server {
 using protocol::Problem;
 using protocol::ProblemKind;
 
-std::uint64_t memory_of(const Cloud& cloud) {
-  std::uint64_t bytes = (cloud.position.size() + cloud.normal.size()) * 3 * sizeof(float);
-  bytes += cloud.color.size() * sizeof(Rgba) + cloud.texcoord.size() * sizeof(TexCoord);
-  bytes += cloud.id.size() * sizeof(std::uint32_t) + cloud.exact_position.size() * 3 * sizeof(double);
-  for (const ScalarAttribute& scalar : cloud.scalars)
-    bytes += std::visit([](const auto& values) { return values.size() * sizeof(values[0]); }, scalar.values);
-  return bytes;
-}
-
 CloudStore::CloudStore(const Limits& limits)
     : max_clouds_(limits.max_clouds), memory_(limits.max_cloud_bytes) {}
 

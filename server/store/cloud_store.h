@@ -24,9 +24,6 @@ struct StoredCloud {
 };
 using SharedCloud = std::shared_ptr<const StoredCloud>;
 
-/// Bytes that the columns of a cloud take.
-std::uint64_t memory_of(const Cloud& cloud);
-
 /// Thread-safe.
 class CloudStore {
  public:
