@@ -22,15 +22,11 @@ constexpr float kLeastWeight = 4.0F;  // lone neighbours must not throw a sample
 constexpr float kMostStep = 0.125F;   // of the radius, in one sweep
 constexpr float kLeastLocal = 0.3F;   // of the spacing wanted: local cells are taken to lie within
 constexpr float kMostLocal = 1.5F;
-constexpr float kMostWay = 0.5F;      // from the place of birth, in cells at rest
+constexpr float kMostWay = 0.65F;     // from the place of birth, in cells at rest
 constexpr float kLeastPlane = 1e-6F;  // least det(U^T U) / trace² of a cell that is not folded flat
 constexpr std::size_t kChildrenOfRange = 512;
 
-// Children where the deformation has them.
-struct Evaluated {
-  Points position;
-  Points along_x, along_y;  // U: J of the patch's tangents there
-};
+using Place = std::array<float, 4>;  // a position; side by side, for there is no order in who asks whom
 
 class Relaxation {
  public:
@@ -43,7 +39,11 @@ class Relaxation {
         count_(births.x.size(), 0),
         radius_(births.x.size(), 0.0F),
         neighbors_(births.x.size() * kMostNeighbors),
+        places_(scene.sampling.size() + births.x.size()),
         moved_(births.x.size()) {
+    parallel_for(scene.sampling.size(), [this](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) places_[i] = place_of(scene_.deformed[i]);
+    });
     for (std::size_t s = 0; s < scene.splits.splits.size(); ++s)
       split_of_[scene.splits.splits[s].sample] = static_cast<std::uint32_t>(s);
   }
@@ -56,11 +56,18 @@ class Relaxation {
         for_children([this](std::size_t child) { list_neighbors(child); });
       }
       for_children([this](std::size_t child) { move(child); });
-      std::swap(now_.position, moved_);
+      for_children([this](std::size_t child) { places_[before() + child] = moved_[child]; });
     }
   }
 
  private:
+  static Place place_of(const Vec3f& p) { return {p.x(), p.y(), p.z(), 0.0F}; }
+  // Of a sample that was there before, or of a child after all of these.
+  [[nodiscard]] Vec3f place(std::size_t index) const {
+    return {places_[index][0], places_[index][1], places_[index][2]};
+  }
+  [[nodiscard]] std::size_t before() const { return scene_.sampling.size(); }
+
   template <typename Body>
   void for_children(const Body& body) {
     parallel_for(
@@ -100,9 +107,9 @@ class Relaxation {
     const ScaleField field = compute_scale_field(rest.position, scene_.regions, scene_.blend);
     MappedCells mapped = map_cells(scene_.map, NormalStencil::all_blocks(count), field, rest, tangents,
                                    offsets ? &shape : nullptr);
-    now_ = {.position = std::move(mapped.position),
-            .along_x = std::move(mapped.cells.u),
-            .along_y = std::move(mapped.cells.v)};
+    for_children([&](std::size_t child) { places_[before() + child] = place_of(mapped.position[child]); });
+    along_x_ = std::move(mapped.cells.u);
+    along_y_ = std::move(mapped.cells.v);
   }
 
   // Weingarten: dn of the jet, in the tangent frame of its normal.
@@ -137,28 +144,22 @@ class Relaxation {
     const Split& own = split(child);
     const float wanted = wanted_spacing(scene_.sampling.spacing[own.sample], scene_.params, scene_.coarser);
     const float area =
-        now_.along_x[child].cross(now_.along_y[child]).norm() *
+        along_x_[child].cross(along_y_[child]).norm() *
         rest_area(scene_.rest.u[own.sample], scene_.rest.v[own.sample], scene_.sampling.spacing[own.sample]) /
         static_cast<float>(own.major * own.minor);
     return kRadius * std::clamp(std::sqrt(area), kLeastLocal * wanted, kMostLocal * wanted);
   }
 
-  // Positions of samples that were there before, then of children.
-  [[nodiscard]] Vec3f place(std::uint32_t index) const {
-    const std::size_t before = scene_.sampling.size();
-    return index < before ? scene_.deformed[index] : now_.position[index - before];
-  }
-
   void list_neighbors(std::size_t child) {
-    const auto before = static_cast<std::uint32_t>(scene_.sampling.size());
-    const Vec3f here = now_.position[child];
+    const auto first = static_cast<std::uint32_t>(before());
+    const Vec3f here = place(first + child);
     const float reach = kListRadius * (radius_[child] = repulsion_radius(child));
     std::uint32_t* list = neighbors_.data() + child * kMostNeighbors;
     std::array<float, kMostNeighbors> distance{};
     std::uint32_t count = 0;
     const auto consider = [&](std::uint32_t index) {
       const float d = (place(index) - here).squaredNorm();
-      if (d >= reach * reach || index == before + child) return;
+      if (d >= reach * reach || index == first + child) return;
       if (count < kMostNeighbors) {
         distance[count] = d;
         list[count++] = index;
@@ -174,7 +175,7 @@ class Relaxation {
       consider(sample);
       if (split_of_[sample] == kNone) return;
       const Split& family = scene_.splits.splits[split_of_[sample]];
-      for (std::uint32_t c = 0; c < family.children(); ++c) consider(before + family.first_child + c);
+      for (std::uint32_t c = 0; c < family.children(); ++c) consider(first + family.first_child + c);
     };
     const RestPatch& patch = scene_.patches.of(split(child).sample);
     consider_family(split(child).sample);
@@ -183,9 +184,9 @@ class Relaxation {
   }
 
   void move(std::size_t child) {
-    moved_.set(child, now_.position[child]);
-    const Vec3f ux = now_.along_x[child];
-    const Vec3f uy = now_.along_y[child];
+    moved_[child] = places_[before() + child];
+    const Vec3f ux = along_x_[child];
+    const Vec3f uy = along_y_[child];
     const float a = ux.squaredNorm();
     const float b = ux.dot(uy);
     const float c = uy.squaredNorm();
@@ -207,51 +208,49 @@ class Relaxation {
     const float old_y = births_.y[child];
     confine(child, old_x + dx, old_y + dy);
     const Vec3f gone = (births_.x[child] - old_x) * ux + (births_.y[child] - old_y) * uy;
-    moved_.set(child, now_.position[child] + gone);
+    moved_[child] = place_of(place(before() + child) + gone);
   }
 
   [[nodiscard]] Vec3f repulsion(std::size_t child) const {
-    const Vec3f here = now_.position[child];
+    const Vec3f here = place(before() + child);
     const float radius = radius_[child];
+    const float inverse = 1.0F / radius;
     Vec3f sum = Vec3f::Zero();
     float weight = 0.0F;
     const std::uint32_t* list = neighbors_.data() + child * kMostNeighbors;
     for (std::uint32_t n = 0; n < count_[child]; ++n) {
       const Vec3f away = here - place(list[n]);
-      const float distance = away.norm();
-      if (distance >= radius) continue;
+      const float square = away.squaredNorm();
+      if (square >= radius * radius) continue;
       weight += 1.0F;
-      if (distance > 0.0F) {
-        sum += (1.0F - distance / radius) / distance * away;
+      if (square > 0.0F) {
+        sum += (1.0F / std::sqrt(square) - inverse) * away;  // (1 - d / R) away / d
       } else {
         // Born at the same place: one goes one way, the other the other way.
-        const float side = list[n] < scene_.sampling.size() + child ? 1.0F : -1.0F;
-        sum += side * now_.along_x[child].normalized();
+        const float side = list[n] < before() + child ? 1.0F : -1.0F;
+        sum += side * along_x_[child].normalized();
       }
     }
     return kGain * radius / std::max(weight, kLeastWeight) * sum;
   }
 
-  // Half a cell from the place of birth at most; beyond the parent's own half cell only toward neighbours.
+  // Not too far from the place of birth; beyond the parent's own half cell only toward neighbours.
   void confine(std::size_t child, float x, float y) {
     const Split& own = split(child);
-    const float half = kMostWay * std::sqrt(rest_area(scene_.rest.u[own.sample], scene_.rest.v[own.sample],
-                                                      scene_.sampling.spacing[own.sample]));
-    float way_x = x - born_x_[child];
-    float way_y = y - born_y_[child];
+    const float cell = std::sqrt(
+        rest_area(scene_.rest.u[own.sample], scene_.rest.v[own.sample], scene_.sampling.spacing[own.sample]));
+    const float way_x = x - born_x_[child];
+    const float way_y = y - born_y_[child];
     const float way = std::sqrt(way_x * way_x + way_y * way_y);
-    if (way > half) {
-      way_x *= half / way;
-      way_y *= half / way;
-    }
-    x = born_x_[child] + way_x;
-    y = born_y_[child] + way_y;
+    const float kept = way > kMostWay * cell ? kMostWay * cell / way : 1.0F;
+    x = born_x_[child] + kept * way_x;
+    y = born_y_[child] + kept * way_y;
     const float distance = std::sqrt(x * x + y * y);
-    if (distance > half) {
+    if (distance > 0.5F * cell) {
       const RestPatch& patch = scene_.patches.of(own.sample);
       const Vec3f direction = x / distance * patch.u + y / distance * patch.v;
       const float born = std::sqrt(born_x_[child] * born_x_[child] + born_y_[child] * born_y_[child]);
-      float reach = std::max(half, born);
+      float reach = std::max(0.5F * cell, born);
       for (std::uint32_t r = 0; r < patch.ring_size; ++r)
         reach = std::max(reach, direction.dot(scene_.rest_position[patch.ring[r]] - patch.center));
       if (distance > reach) {
@@ -267,11 +266,12 @@ class Relaxation {
   Births& births_;
   const std::vector<float> born_x_, born_y_;
   std::vector<std::uint32_t> split_of_;  // by sample
-  Evaluated now_;
-  std::vector<std::uint32_t> count_;  // by child
+  Points along_x_, along_y_;             // U: J of the patch's tangents at the children
+  std::vector<std::uint32_t> count_;     // by child
   std::vector<float> radius_;
   std::vector<std::uint32_t> neighbors_;
-  Points moved_;
+  std::vector<Place> places_;
+  std::vector<Place> moved_;
 };
 
 }  // namespace

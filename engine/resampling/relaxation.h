@@ -31,7 +31,7 @@ struct RelaxationScene {
 /// Moves children apart: Jacobi sweeps of repulsion among the families of each child's parent and of its
 /// neighbours at rest, so neighbourhoods are never searched for in space and sheets that touch never mix. A
 /// displacement is taken back to rest space by (U^T U)^-1 U^T, U = J E; F and U are evaluated anew every four
-/// sweeps. Nobody goes farther than half a cell from where it was born, or over the border of the surface.
+/// sweeps. Nobody goes farther than two thirds of a cell from where it was born, or over the border of the surface.
 /// Paper:       §5.2; in rest space (engine/README.md says why)
 /// Cost:        O(C) a sweep, parallel
 /// Determinism: bitwise equal for any thread count and instruction set
