@@ -1,10 +1,10 @@
 #include "engine/resampling/neighborhood_update.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 
 #include "engine/core/parallel.h"
+#include "engine/resampling/nearest_few.h"
 
 namespace pointwright {
 namespace {
@@ -12,35 +12,6 @@ namespace {
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kSamplesOfRange = 512;
 constexpr std::uint32_t kMostNeighbors = 32;  // of a hierarchy's graph
-
-// The nearest so far, ascending; ties by the lower sample.
-class NearestRow {
- public:
-  explicit NearestRow(std::uint32_t k) : k_(std::min(k, kMostNeighbors)) {}
-
-  void consider(float distance, std::uint32_t sample) {
-    if (count_ == k_ && !before(distance, sample, count_ - 1)) return;
-    std::uint32_t place = count_ < k_ ? count_++ : count_ - 1;
-    for (; place > 0 && before(distance, sample, place - 1); --place) {
-      distance_[place] = distance_[place - 1];
-      sample_[place] = sample_[place - 1];
-    }
-    distance_[place] = distance;
-    sample_[place] = sample;
-  }
-  [[nodiscard]] std::uint32_t count() const { return count_; }
-  [[nodiscard]] std::uint32_t operator[](std::uint32_t j) const { return sample_[j]; }
-
- private:
-  [[nodiscard]] bool before(float distance, std::uint32_t sample, std::uint32_t place) const {
-    return distance < distance_[place] || (distance == distance_[place] && sample < sample_[place]);
-  }
-
-  std::uint32_t k_;
-  std::uint32_t count_ = 0;
-  std::array<float, kMostNeighbors> distance_{};
-  std::array<std::uint32_t, kMostNeighbors> sample_{};
-};
 
 class Update {
  public:
@@ -60,7 +31,7 @@ class Update {
 
   // The row of sample i, `old` the one of before that its candidates come from.
   void set_row(std::size_t i, std::uint32_t old, NeighborGraph& graph) const {
-    NearestRow nearest(graph.k);
+    NearestFew<kMostNeighbors> nearest(graph.k);
     const Vec3f here = position_[i];
     const auto consider = [&](std::uint32_t j) {
       const float distance = (position_[j] - here).squaredNorm();
