@@ -178,8 +178,8 @@ draco::Status encode(draco::PointCloud& cloud, int position, int position_bits, 
   return encoder.EncodeToBuffer(&buffer);
 }
 
-// Entropy coding has to save more than a sixth. In a coherent order it saves over a half; of 14 bits in random
-// order an eighth, and takes seven times as long to decode.
+// Entropy coding has to save more than a sixth. In a coherent order it saves over a half; of 14 bits in
+// random order an eighth, and takes seven times as long to decode.
 bool is_worth_decoding(const draco::EncoderBuffer& coded, const draco::EncoderBuffer& plain) {
   return 6 * coded.size() < 5 * plain.size();
 }
