@@ -8,6 +8,10 @@ namespace {
 
 /// Frames of one picture that are kept: viewers mostly ask for the same delta, newcomers for the key.
 constexpr std::size_t kKeptFrames = 3;
+/// Frames that no viewer reads any more and whose memory the next one takes.
+constexpr std::size_t kUnusedFrames = 1;
+/// How many times more memory than it needs a frame may hold on to.
+constexpr std::size_t kMostSlack = 4;
 
 protocol::FrameState frame_state(const Picture& picture, const Cloud& cloud, std::uint32_t level) {
   return {.level = static_cast<std::uint8_t>(level),
@@ -50,7 +54,7 @@ SharedFrame encode_picture(const protocol::FrameLayout& layout, const Picture& p
 }
 
 Display::Display(std::shared_ptr<const Cloud> cloud)
-    : cloud_(std::move(cloud)), layout_(static_cast<std::uint32_t>(cloud_->size())) {}
+    : cloud_(std::move(cloud)), layout_(static_cast<std::uint32_t>(cloud_->size())), unused_(kUnusedFrames) {}
 
 std::shared_ptr<Display::Shown> Display::shown() const {
   const std::lock_guard lock(mutex_);
@@ -109,7 +113,8 @@ Display::Frame Display::frame_since(std::uint64_t version, std::uint16_t attribu
   auto state = frame_state(now->picture, *cloud_, level);
   state.bounds = now->bounds;
   const auto columns = frame_columns(now->picture, *cloud_, level);
-  auto bytes = std::make_shared<protocol::FrameBytes>();
+  auto bytes = unused_.take();
+  if (bytes == nullptr) bytes = std::make_unique<protocol::FrameBytes>();
   if (since == 0) {
     encode_key_frame(layout_, columns, state, attributes, *bytes);
   } else {
@@ -118,8 +123,10 @@ Display::Frame Display::frame_since(std::uint64_t version, std::uint16_t attribu
       if (now->block_versions[block] > since) blocks.push_back(block);
     encode_delta_frame(layout_, columns, state, attributes, blocks, *bytes);
   }
+  if (bytes->capacity() > kMostSlack * bytes->size()) bytes->shrink_to_fit();
   if (frames.size() == kKeptFrames) frames.pop_back();
-  frames.insert(frames.begin(), {.since = since, .attributes = attributes, .bytes = std::move(bytes)});
+  frames.insert(frames.begin(),
+                {.since = since, .attributes = attributes, .bytes = unused_.share(std::move(bytes))});
   return {frames.front().bytes, now->version};
 }
 

@@ -12,6 +12,7 @@
 #include "engine/multires/surface.h"
 #include "protocol/frames/frame.h"
 #include "protocol/frames/layout.h"
+#include "server/base/recycler.h"
 
 namespace pointwright::server {
 
@@ -71,6 +72,7 @@ class Display {
 
   std::shared_ptr<const Cloud> cloud_;
   protocol::FrameLayout layout_;
+  Recycler<protocol::FrameBytes> unused_;
   mutable std::mutex mutex_;  // guards shown_
   std::shared_ptr<Shown> shown_;
 };

@@ -248,12 +248,20 @@ Outcome<Session::SharedField> Session::ensure_field(std::uint32_t level, Blend b
   active_level_ = level;
   if (field_key_ != key) {
     const auto begin = SteadyClock::now();
-    auto field = field_of(rest_, now->surface, level, blend, *now->marks);
+    const Points& position = now->surface.surface->levels[level].position;
+    FieldKey before = last_field_ ? last_field_->first : FieldKey{};
+    before.marks = now->marks;
+    if (before != key) last_field_.reset();
+    // After a stroke most samples keep their t.
+    auto painted =
+        last_field_ ? last_field_->second.repainted(position, rest_.spacing, *now->marks, rest_.cloud->origin)
+                    : PaintedField::make(position, rest_.spacing, *now->marks, rest_.cloud->origin, blend);
     note_time("field", begin);
+    if (painted) last_field_.emplace(key, painted.value());
     const std::lock_guard lock(field_mutex_);
     field_key_ = key;
-    field_ = field.ok() ? field.value() : nullptr;
-    field_problem_ = field.ok() ? std::nullopt : std::optional<Problem>(protocol::to_problem(field.error()));
+    field_ = painted ? painted.value().field() : nullptr;
+    field_problem_ = painted ? std::nullopt : std::optional<Problem>(protocol::to_problem(painted.error()));
   }
   shown_field_ = field_;
   if (field_problem_) return *field_problem_;

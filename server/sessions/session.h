@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "engine/editing/painted_field.h"
 #include "server/base/outcome.h"
 #include "server/sessions/display.h"
 #include "server/sessions/document.h"
@@ -179,6 +180,7 @@ class Session : public std::enable_shared_from_this<Session> {
   };
   std::optional<LastPreview> last_preview_;
   std::unique_ptr<Drag> drag_;
+  std::optional<std::pair<FieldKey, PaintedField>> last_field_;  // that could be made
 
   mutable std::mutex field_mutex_;  // guards the next three, which only the strand writes
   std::optional<FieldKey> field_key_;
