@@ -13,35 +13,38 @@ namespace {
 constexpr std::size_t kBlocksOfRange = kParallelBlock / kSimdBlock;
 constexpr float kGreatestAnisotropy = 1e6F;
 
-// `side` without its part along the normal, as long as it was; nothing where it stands upright.
+}  // namespace
+
 Vec3f turned_into_plane(const Vec3f& side, const Vec3f& normal) {
   const Vec3f along = side - side.dot(normal) * normal;
   const float length = along.norm();
   return length > 0.0F ? Vec3f(side.norm() / length * along) : Vec3f::Zero();
 }
 
-}  // namespace
-
 Cells cells_on_level(const Sampling& sampling, const Points& normal,
                      const std::vector<std::uint32_t>& blocks) {
   const std::size_t n = normal.size();
   POINTWRIGHT_CHECK(sampling.size() == n, "normals of the sampling's samples");
-  const bool carried = !sampling.cell_u.empty();
-  Cells cells{.u = carried ? sampling.cell_u : Points(n), .v = carried ? sampling.cell_v : Points(n)};
+  Cells cells{.u = sampling.cell_u, .v = sampling.cell_v};
+  if (cells.u.empty()) {
+    cells = {.u = Points(n), .v = Points(n)};
+    parallel_for(n, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const TangentFrame frame = tangent_frame(normal[i].cast<double>());
+        cells.u.set(i, frame.u.cast<float>());
+        cells.v.set(i, frame.v.cast<float>());
+      }
+    });
+    return cells;
+  }
   parallel_for(
       blocks.size(),
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t entry = begin; entry < end; ++entry) {
           const std::size_t first = std::size_t{blocks[entry]} * kSimdBlock;
           for (std::size_t i = first; i < std::min(first + kSimdBlock, n); ++i) {
-            if (carried) {
-              cells.u.set(i, turned_into_plane(cells.u[i], normal[i]));
-              cells.v.set(i, turned_into_plane(cells.v[i], normal[i]));
-            } else {
-              const TangentFrame frame = tangent_frame(normal[i].cast<double>());
-              cells.u.set(i, frame.u.cast<float>());
-              cells.v.set(i, frame.v.cast<float>());
-            }
+            cells.u.set(i, turned_into_plane(cells.u[i], normal[i]));
+            cells.v.set(i, turned_into_plane(cells.v[i], normal[i]));
           }
         }
       },

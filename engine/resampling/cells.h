@@ -17,9 +17,11 @@ struct Cells {
   Points u, v;
 };
 
+/// A side without its part along the unit normal, as long as it was; nothing where it stands upright.
+Vec3f turned_into_plane(const Vec3f& side, const Vec3f& normal);
+
 /// The cells that the sampling carries, each side turned into the tangent plane of the level's normal with
-/// its length kept; unit squares in the tangent frames where it carries none. Samples of `blocks` alone, the
-/// others as they are carried, or 0.
+/// its length kept, where samples are in `blocks`; unit squares in the tangent frames where it carries none.
 /// Cost: O(N), parallel
 Cells cells_on_level(const Sampling& sampling, const Points& normal,
                      const std::vector<std::uint32_t>& blocks);

@@ -33,13 +33,6 @@ float interpolated(const ZombieWeights& weights, const std::vector<float>& colum
   return sum;
 }
 
-// `side` without its part along the normal, as long as it was.
-Vec3f in_plane(const Vec3f& side, const Vec3f& normal) {
-  const Vec3f along = side - side.dot(normal) * normal;
-  const float length = along.norm();
-  return length > 0.0F ? Vec3f(side.norm() / length * along) : Vec3f::Zero();
-}
-
 }  // namespace
 
 void append_children(const Inserted& inserted, std::uint32_t level, MultiresSurface& surface) {
@@ -128,8 +121,8 @@ void divide_cells(const Inserted& inserted, const Cells& rest, const DeformMap& 
             const Vec3f normal = level.normal[before + c];
             children.position.set(c, level.position[before + c]);
             children.normal.set(c, normal);
-            parts.u.set(c, in_plane(along, normal));
-            parts.v.set(c, in_plane(across, normal));
+            parts.u.set(c, turned_into_plane(along, normal));
+            parts.v.set(c, turned_into_plane(across, normal));
             part.t[c] = field.t[before + c];
             part.gradient.set(c, field.gradient[before + c]);
             if (shape == nullptr) continue;
