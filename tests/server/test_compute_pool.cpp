@@ -9,7 +9,8 @@
 
 #include "server/sessions/compute_pool.h"
 
-using namespace pointwright::server;
+using pointwright::server::ComputePool;
+using pointwright::server::Strand;
 
 namespace {
 
