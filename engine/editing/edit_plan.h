@@ -54,7 +54,7 @@ class EditPlan {
     return stencils_[level - level_ - 1];
   }
   /// Of the edited level; null where no deformation that the plan serves needs them.
-  [[nodiscard]] const ShapeOperators* shape() const { return shape_.size() > 0 ? &shape_ : nullptr; }
+  [[nodiscard]] const ShapeOperators* shape() const { return offsets_ ? &shape_ : nullptr; }
 
  private:
   std::uint32_t level_;

@@ -33,11 +33,11 @@ std::shared_ptr<const Sampling> carried_sampling(const std::shared_ptr<const Sam
   const Level& level = surface.levels[params.level];
   const std::vector<std::uint32_t> blocks = moving_blocks(field);
   ShapeOperators shape;
-  if (needs_shape_operators(params.deformation))
-    shape = shape_operators(level, NormalStencil(level, *sampling->graph, blocks));
+  const bool offsets = needs_shape_operators(params.deformation);
+  if (offsets) shape = shape_operators(level, NormalStencil(level, *sampling->graph, blocks));
   const Cells rest = cells_on_level(*sampling, level.normal, blocks);
   MappedCells mapped = map_cells(to_deform_map(params.deformation, sampling->cloud->origin), blocks, field,
-                                 level, rest, shape.size() > 0 ? &shape : nullptr);
+                                 level, rest, offsets ? &shape : nullptr);
   auto carried = std::make_shared<Sampling>(*sampling);
   carried->cell_u = std::move(mapped.cells.u);
   carried->cell_v = std::move(mapped.cells.v);

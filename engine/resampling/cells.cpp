@@ -12,13 +12,37 @@ namespace {
 
 constexpr std::size_t kBlocksOfRange = kParallelBlock / kSimdBlock;
 constexpr float kGreatestAnisotropy = 1e6F;
+// Sides beyond these have fourth powers that overflow or vanish.
+constexpr float kLongSide = 0x1p24F;
+constexpr float kShortSide = 0x1p-24F;
+
+PrincipalStretch stretch_of_sides(const Vec3f& u, const Vec3f& v) {
+  const float uu = u.squaredNorm();
+  const float uv = u.dot(v);
+  const float vv = v.squaredNorm();
+  const float mean = 0.5F * (uu + vv);
+  const float half = 0.5F * (uu - vv);
+  const float radius = std::sqrt(half * half + uv * uv);
+  PrincipalStretch stretch;
+  stretch.major = std::sqrt(mean + radius);
+  // |u x v| = major * minor: the difference of two close eigenvalues would lose it.
+  stretch.minor = stretch.major > 0.0F ? u.cross(v).norm() / stretch.major : 0.0F;
+  const float c = half >= 0.0F ? half + radius : std::abs(uv);
+  const float s = half >= 0.0F ? uv : std::copysign(radius - half, uv);
+  const float length = std::sqrt(c * c + s * s);
+  if (length > 0.0F) {
+    stretch.cosine = c / length;
+    stretch.sine = s / length;
+  }
+  return stretch;
+}
 
 }  // namespace
 
 Vec3f turned_into_plane(const Vec3f& side, const Vec3f& normal) {
   const Vec3f along = side - side.dot(normal) * normal;
-  const float length = along.norm();
-  return length > 0.0F ? Vec3f(side.norm() / length * along) : Vec3f::Zero();
+  const float length = along.stableNorm();
+  return length > 0.0F ? Vec3f(side.stableNorm() / length * along) : Vec3f::Zero();
 }
 
 Cells cells_on_level(const Sampling& sampling, const Points& normal,
@@ -69,23 +93,16 @@ MappedCells map_cells(const DeformMap& map, const std::vector<std::uint32_t>& bl
 }
 
 PrincipalStretch principal_stretch(const Vec3f& u, const Vec3f& v) {
-  const float uu = u.squaredNorm();
-  const float uv = u.dot(v);
-  const float vv = v.squaredNorm();
-  const float mean = 0.5F * (uu + vv);
-  const float half = 0.5F * (uu - vv);
-  const float radius = std::sqrt(half * half + uv * uv);
-  PrincipalStretch stretch;
-  stretch.major = std::sqrt(mean + radius);
-  // |u x v| = major * minor: the difference of two close eigenvalues would lose it.
-  stretch.minor = stretch.major > 0.0F ? u.cross(v).norm() / stretch.major : 0.0F;
-  const float c = half >= 0.0F ? half + radius : std::abs(uv);
-  const float s = half >= 0.0F ? uv : std::copysign(radius - half, uv);
-  const float length = std::sqrt(c * c + s * s);
-  if (length > 0.0F) {
-    stretch.cosine = c / length;
-    stretch.sine = s / length;
-  }
+  const float longest = std::max(u.cwiseAbs().maxCoeff(), v.cwiseAbs().maxCoeff());
+  const bool extreme = longest > kLongSide || (longest > 0.0F && longest < kShortSide);
+  if (!extreme || !std::isfinite(longest)) return stretch_of_sides(u, v);
+  int exponent = 0;
+  (void)std::frexp(longest, &exponent);
+  exponent = std::max(exponent, -120);              // its opposite is one of floats, too
+  const float scale = std::ldexp(1.0F, -exponent);  // a power of two rounds nothing
+  PrincipalStretch stretch = stretch_of_sides(scale * u, scale * v);
+  stretch.major = std::ldexp(stretch.major, exponent);
+  stretch.minor = std::ldexp(stretch.minor, exponent);
   return stretch;
 }
 

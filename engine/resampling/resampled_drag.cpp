@@ -87,8 +87,7 @@ class ResampledDrag::Work {
   }
 
   [[nodiscard]] bool serves(const EditParams& params) const {
-    return params.resampling.has_value() && plan_.serves(params) &&
-           (shape_.size() > 0 || !needs_shape_operators(params.deformation));
+    return params.resampling.has_value() && plan_.serves(params);
   }
 
   Result<ResampledEdit> frame(const EditParams& params, ResamplingEffort effort, MultiresSurface room,
@@ -97,7 +96,7 @@ class ResampledDrag::Work {
     const bool preview = effort == ResamplingEffort::kPreview;
     const DeformMap map = to_deform_map(params.deformation, sampling_->cloud->origin);
     const MappedCells mapped =
-        map_cells(map, blocks_, *field_, level_, rest_cells_, shape_.size() > 0 ? &shape_ : nullptr);
+        map_cells(map, blocks_, *field_, level_, rest_cells_, plan_.shape() != nullptr ? &shape_ : nullptr);
     float coarser = 1.0F;
     auto splits = counted(mapped.cells, *params.resampling, preview, coarser);
     if (!splits) return splits.error();

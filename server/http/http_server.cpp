@@ -216,8 +216,8 @@ class HttpServer::Fence final : public httplib::Server {
 
   bool accept_until_stopped() {
     run_called_ = true;
-    if (context_.stopping) return true;
-    listen_after_bind();
+    if (!context_.stopping) listen_after_bind();
+    // In either case: who stops the server at this moment waits for it.
     run_ended_ = true;
     return context_.stopping;
   }

@@ -1,6 +1,7 @@
 #include "server/sessions/compute_pool.h"
 
 #include <exception>
+#include <utility>
 
 #include "engine/core/parallel.h"
 
@@ -63,7 +64,19 @@ void Strand::post(std::function<void()> task) {
     if (state_->running) return;
     state_->running = true;
   }
-  state_->pool.post([state = state_] { run_one(state); });
+  queue_up(state_);
+}
+
+void Strand::queue_up(const std::shared_ptr<State>& state) {
+  state->pool.post([turn = std::make_shared<Turn>(state)] { run_one(std::exchange(turn->state, nullptr)); });
+}
+
+Strand::Turn::~Turn() {
+  if (state == nullptr) return;
+  std::deque<std::function<void()>> dropped;  // let go without the lock: whatever they hold
+  const std::lock_guard lock(state->mutex);
+  dropped.swap(state->tasks);
+  state->running = false;
 }
 
 bool Strand::is_idle_behind() const {
@@ -88,7 +101,7 @@ void Strand::run_one(const std::shared_ptr<State>& state) {
     }
   }
   // One task at a time through the pool: busy sessions take turns.
-  state->pool.post([state] { run_one(state); });
+  queue_up(state);
 }
 
 }  // namespace pointwright::server

@@ -386,6 +386,28 @@ TEST_CASE("stopping ends streams with their last words and refuses new requests"
   CHECK_THROWS(RawClient(port).send(get("/")));
 }
 
+TEST_CASE("a server that is stopped at the moment at which it begins to serve ends") {
+  // The threads meet anywhere in each other's course; a stop that misses the other's end would wait for ever.
+  for (int i = 0; i < 500; ++i) {
+    HttpServer server({}, {}, {});
+    REQUIRE_FALSE(server.start().has_value());
+    std::atomic<int> begun{0};
+    std::atomic<bool> ended_as_asked{false};
+    const auto meet = [&begun] {
+      ++begun;
+      while (begun < 2) std::this_thread::yield();
+    };
+    std::thread listener([&] {
+      meet();
+      ended_as_asked = server.run();
+    });
+    meet();
+    CHECK(server.stop(std::chrono::milliseconds(3000)));
+    listener.join();
+    CHECK(ended_as_asked);
+  }
+}
+
 TEST_CASE("a second server on the same port fails to start") {
   TestServer server;
   HttpOptions options;
