@@ -68,7 +68,8 @@ class History::Walk {
     const Node& node = nodes_[to.node];
     state_ = {.surface = own_,
               .reports = to.derived ? node.derived_reports : node.reports,
-              .first_valid_level = to.derived ? 0 : node.first_valid_level};
+              .first_valid_level = to.derived ? 0 : node.first_valid_level,
+              .samples = state_.samples};
     place_ = to;
   }
   void jump(SurfaceState state, Place to) {

@@ -99,7 +99,7 @@ class Application {
  private:
   std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
     auto marks = std::make_shared<Marks>(whole_.surface->finest().position.size(), std::uint8_t{0});
-    Painter painter(session_.params(), paint_surface(session_.rest(), whole_), {}, {});
+    Painter painter(session_.params(), paint_surface(whole_), {}, {});
     const std::string place = place_of(index);
     if (auto problem = paint(painter, RegionKind::kZero, edit.zero, *marks, place + "/zero/operations"))
       return problem;

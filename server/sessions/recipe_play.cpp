@@ -107,7 +107,7 @@ Outcome<Picture> partial_picture(Session& session, std::uint32_t level, const Pl
   std::shared_ptr<const ScaleField> field;
   if (with_t) {
     const std::uint32_t coarsest = state.value().first_valid_level;
-    if (auto made = field_of(session.rest(), state.value(), coarsest, Blend::kQuartic, *now.marks); made)
+    if (auto made = field_of(state.value(), coarsest, Blend::kQuartic, *now.marks); made)
       field = made.value();  // without usable regions t is 0 everywhere
   }
   return session.picture_of(now, state.value(), std::move(field), 0);

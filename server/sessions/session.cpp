@@ -4,7 +4,6 @@
 
 #include "engine/core/median.h"
 #include "engine/core/parallel.h"
-#include "engine/spatial/splat_radius.h"
 
 namespace pointwright::server {
 
@@ -36,13 +35,11 @@ Session::Session(SessionParams params, SessionServices services)
     : params_(std::move(params)),
       services_(std::move(services)),
       strand_(services_.interactive),
-      display_(params_.cloud),
       document_(std::make_shared<const Document>(
           Document{.bounds = model_bounds(params_.cloud->position, params_.cloud->origin)})) {
-  rest_ = RestModel{.cloud = params_.cloud,
-                    .params = params_.hierarchy,
+  rest_ = RestModel{.params = params_.hierarchy,
+                    .origin = params_.cloud->origin,
                     .diagonal = bounds_of(params_.cloud->position).diagonal(),
-                    .spacing = {},
                     .build = services_.build};
 }
 
@@ -80,18 +77,16 @@ void Session::finish_building(Result<Hierarchy> built) {
   if (!built) return fail(protocol::to_problem(built.error()));
   Document document = *this->document();
   Hierarchy hierarchy = std::move(built).value();
-  const Level& rest = hierarchy.surface.finest();
-  auto radius = std::make_shared<std::vector<std::uint16_t>>();
-  for (const float value : splat_radii(rest.position, rest.normal, hierarchy.graph))
-    radius->push_back(protocol::to_bfloat16(value));
-  rest_.splat_radius = std::move(radius);
-  rest_.spacing = std::move(hierarchy.spacing);
-  rest_.graph = std::make_shared<const NeighborGraph>(std::move(hierarchy.graph));
-  median_spacing_ = median(rest_.spacing);
+  const SharedSamples samples = samples_at_rest(
+      rest_sampling(params_.cloud, std::make_shared<const NeighborGraph>(std::move(hierarchy.graph)),
+                    std::move(hierarchy.spacing)),
+      hierarchy.surface.finest());
+  document.spacing = median(samples->sampling->spacing);
   SurfaceState state{
       .surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
       .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),
-      .first_valid_level = 0};
+      .first_valid_level = 0,
+      .samples = samples};
   history_.emplace(
       state, params_.history_bytes,
       History::Work{
@@ -131,6 +126,7 @@ void Session::note_time(const std::string& name, SteadyClock::time_point begin) 
 }
 
 protocol::SessionDocument Session::describe(const Document& document) const {
+  const bool is_ready = document.state == protocol::SessionState::kReady;
   protocol::SessionDocument result;
   result.summary = {.id = params_.id,
                     .name = params_.name,
@@ -138,7 +134,7 @@ protocol::SessionDocument Session::describe(const Document& document) const {
                     .state = document.state,
                     .revision = document.revision,
                     .created = created_,
-                    .sample_count = params_.cloud->size()};
+                    .sample_count = is_ready ? document.surface.samples->size() : params_.cloud->size()};
   result.progress = context_.progress();
   result.error = document.error;
   result.origin = params_.cloud->origin;
@@ -146,8 +142,8 @@ protocol::SessionDocument Session::describe(const Document& document) const {
   for (const float scale : params_.hierarchy.scales)
     result.level_scales.push_back(static_cast<double>(scale) * static_cast<double>(rest_.diagonal));
   result.level_scales.push_back(0.0);
-  if (document.state == protocol::SessionState::kReady) {
-    result.spacing = median_spacing_;
+  if (is_ready) {
+    result.spacing = document.spacing;
     result.decomposition = *document.surface.reports;
     result.zero = {.samples = document.zero.samples, .operations = document.zero.operations->size()};
     result.one = {.samples = document.one.samples, .operations = document.one.operations->size()};
@@ -213,7 +209,7 @@ Picture Session::picture_of(const Document& now, const SurfaceState& state, Shar
   return {.surface = state.surface,
           .field = std::move(field),
           .marks = now.marks,
-          .splat_radius = rest_.splat_radius,
+          .samples = state.samples,
           .detail_range = detail_range_of(state),
           .revision = now.revision,
           .sequence = sequence};
@@ -248,7 +244,7 @@ Outcome<Session::SharedField> Session::ensure_field(std::uint32_t level, Blend b
   active_level_ = level;
   if (field_key_ != key) {
     const auto begin = SteadyClock::now();
-    auto field = field_of(rest_, now->surface, level, blend, *now->marks);
+    auto field = field_of(now->surface, level, blend, *now->marks);
     note_time("field", begin);
     const std::lock_guard lock(field_mutex_);
     field_key_ = key;
@@ -312,7 +308,8 @@ Outcome<SurfaceState> Session::compute(const EditParams& params) {
   if (auto reach = check_reach(*surface, params.level); !reach) return protocol::to_problem(reach.error());
   SurfaceState after{.surface = std::move(surface),
                      .reports = now->surface.reports,
-                     .first_valid_level = std::max(now->surface.first_valid_level, params.level)};
+                     .first_valid_level = std::max(now->surface.first_valid_level, params.level),
+                     .samples = now->surface.samples};
   note_time("edit", begin);
   last_preview_ = LastPreview{.base = *field_key_, .params = params, .after = after};
   return after;
@@ -377,7 +374,7 @@ Outcome<SharedFrame> Session::render_preview(const protocol::PreviewRequest& req
     if (!after.ok()) return after.problem();
     const Picture picture = picture_of(*now, after.value(), field_, request.sequence);
     const auto finest = static_cast<std::uint32_t>(picture.surface->band_count());
-    return encode_picture(display_.layout(), picture, *params_.cloud, finest, attributes);
+    return encode_picture(picture, finest, attributes);
   });
 }
 

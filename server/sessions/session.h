@@ -29,6 +29,7 @@ class Session : public std::enable_shared_from_this<Session> {
   [[nodiscard]] const std::string& id() const { return params_.id; }
   [[nodiscard]] const std::string& name() const { return params_.name; }
   [[nodiscard]] const std::string& cloud_id() const { return params_.cloud_id; }
+  /// As it was uploaded.
   [[nodiscard]] const Cloud& cloud() const { return *params_.cloud; }
   [[nodiscard]] const SessionParams& params() const { return params_; }
   /// Pre: the session is ready
@@ -89,9 +90,9 @@ class Session : public std::enable_shared_from_this<Session> {
   /// What viewers see of a state: the committed one, or a preview's (sequence > 0).
   [[nodiscard]] Picture picture_of(const Document& now, const SurfaceState& state,
                                    std::shared_ptr<const ScaleField> field, std::uint64_t sequence) const;
-  /// The cloud as edited: the upload's columns in coherent order, moved samples at their new places on
-  /// `level` of the picture. Cost: a copy of the cloud.
-  [[nodiscard]] std::shared_ptr<const Cloud> edited_cloud(const Picture& picture, std::uint32_t level) const;
+  /// The cloud as edited: the columns of the picture's samples in coherent order, moved ones at their new
+  /// places on `level` of the picture. Cost: a copy of the cloud.
+  [[nodiscard]] static std::shared_ptr<const Cloud> edited_cloud(const Picture& picture, std::uint32_t level);
   /// Those frame attributes that there is something to fill with.
   [[nodiscard]] std::uint16_t available_attributes(std::uint16_t asked) const;
 
@@ -165,7 +166,6 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // Written once by finish_building(), before the document says that the session is ready.
   RestModel rest_;
-  double median_spacing_ = 0.0;
 
   // The strand's own.
   std::optional<History> history_;

@@ -49,8 +49,7 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<Pa
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
   const bool is_zero = kind == RegionKind::kZero;
-  Painter painter(params_, paint_surface(rest_, before->surface),
-                  append || !is_zero ? before->zero : Painting{},
+  Painter painter(params_, paint_surface(before->surface), append || !is_zero ? before->zero : Painting{},
                   append || is_zero ? before->one : Painting{});
   for (const PaintOperation& operation : operations) {
     if (auto painted = painter.paint(kind, operation, *marks, context_); !painted.ok())
@@ -208,9 +207,9 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
   });
 }
 
-std::shared_ptr<const Cloud> Session::edited_cloud(const Picture& picture, std::uint32_t level) const {
+std::shared_ptr<const Cloud> Session::edited_cloud(const Picture& picture, std::uint32_t level) {
   const Level& now = picture.surface->levels[level];
-  return std::make_shared<const Cloud>(moved_cloud(*params_.cloud, now.position, now.normal));
+  return std::make_shared<const Cloud>(moved_cloud(picture.samples->cloud(), now.position, now.normal));
 }
 
 std::uint16_t Session::available_attributes(std::uint16_t asked) const {

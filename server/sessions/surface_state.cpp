@@ -46,7 +46,7 @@ Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState&
   // The levels that are valid stay as they are, to the bit: the coarsest of them is what the others are made
   // of. So looking at a level changes no later edit.
   const Level& from = state.surface->levels[valid];
-  Cloud current = *rest.cloud;
+  Cloud current = state.samples->cloud();
   current.position = from.position;
   current.normal = from.normal;
   current.exact_position.clear();
@@ -75,13 +75,17 @@ Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState&
     const float base = valid < reports->size() ? (*reports)[valid].scale : 0.0F;
     (*reports)[k].scale = std::sqrt(derived * derived + base * base);
   }
-  return SurfaceState{.surface = std::move(surface), .reports = std::move(reports), .first_valid_level = 0};
+  return SurfaceState{.surface = std::move(surface),
+                      .reports = std::move(reports),
+                      .first_valid_level = 0,
+                      .samples = state.samples};
 }
 
-Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const SurfaceState& state,
-                                                   std::uint32_t level, Blend blend, const Marks& marks) {
+Result<std::shared_ptr<const ScaleField>> field_of(const SurfaceState& state, std::uint32_t level,
+                                                   Blend blend, const Marks& marks) {
   const Points& position = state.surface->levels[level].position;
-  auto regions = regions_from_marks(position, rest.spacing, marks, rest.cloud->origin);
+  const Sampling& sampling = *state.samples->sampling;
+  auto regions = regions_from_marks(position, sampling.spacing, marks, sampling.cloud->origin);
   if (!regions) return regions.error();
   return std::make_shared<const ScaleField>(compute_scale_field(position, regions.value(), blend));
 }
@@ -89,9 +93,10 @@ Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const 
 SurfaceState edited(const RestModel& rest, const SurfaceState& state, const EditParams& params,
                     const ScaleField& field) {
   return SurfaceState{.surface = std::make_shared<const MultiresSurface>(
-                          apply_edit(*state.surface, *rest.graph, params, field, rest.cloud->origin)),
+                          apply_edit(*state.surface, state.samples->graph(), params, field, rest.origin)),
                       .reports = state.reports,
-                      .first_valid_level = std::max(state.first_valid_level, params.level)};
+                      .first_valid_level = std::max(state.first_valid_level, params.level),
+                      .samples = state.samples};
 }
 
 Result<void> check_reach(const MultiresSurface& surface, std::uint32_t level) {
@@ -119,7 +124,7 @@ Result<SurfaceState> replayed(const RestModel& rest, const SurfaceState& before,
                               const ExecutionContext& context) {
   auto state = with_valid_level(rest, before, record.params.level, context);
   if (!state) return state.error();
-  auto field = field_of(rest, state.value(), record.params.level, record.params.blend, *record.marks);
+  auto field = field_of(state.value(), record.params.level, record.params.blend, *record.marks);
   if (!field) return field.error();
   return edited(rest, state.value(), record.params, *field.value());
 }

@@ -12,6 +12,7 @@
 #include "engine/editing/painting.h"
 #include "engine/editing/scale_field.h"
 #include "engine/multires/hierarchy.h"
+#include "server/sessions/sample_set.h"
 
 namespace pointwright::server {
 
@@ -21,12 +22,9 @@ using HierarchyBuilder =
 
 /// What never changes while a session lives.
 struct RestModel {
-  std::shared_ptr<const Cloud> cloud;
   HierarchyParams params;
+  Vec3d origin = Vec3d::Zero();
   float diagonal = 0.0F;  ///< of the rest cloud: what the scales are fractions of
-  std::shared_ptr<const NeighborGraph> graph;
-  std::vector<float> spacing;
-  std::shared_ptr<const std::vector<std::uint16_t>> splat_radius;  ///< for viewers: bfloat16, by sample
   HierarchyBuilder build;
 };
 
@@ -36,11 +34,12 @@ struct SurfaceState {
   std::shared_ptr<const std::vector<DecompositionReport>> reports;
   /// Levels below this one no longer match the finer ones: an edit of a finer level moved those alone.
   std::uint32_t first_valid_level = 0;
+  SharedSamples samples = {};
 
   friend bool operator==(const SurfaceState&, const SurfaceState&) = default;  ///< the same objects
 };
 
-/// Bytes that the state's surface takes.
+/// Bytes that the state's surface takes, without its samples: states share those.
 std::uint64_t memory_of(const SurfaceState& state);
 
 /// The state with `level` valid: derives the hierarchy of the current surface where it is not. The finest
@@ -52,8 +51,8 @@ Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState&
 /// t on the samples of a level, from the marks.
 /// Pre:    the level is valid
 /// Errors: kEmptyRegion, kRegionsIntersect
-Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const SurfaceState& state,
-                                                   std::uint32_t level, Blend blend, const Marks& marks);
+Result<std::shared_ptr<const ScaleField>> field_of(const SurfaceState& state, std::uint32_t level,
+                                                   Blend blend, const Marks& marks);
 
 /// How far from the cloud's origin an edit may take a sample, model units, summed over the axes.
 inline constexpr float kMaxReach = 1e12F;

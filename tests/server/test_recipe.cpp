@@ -347,7 +347,7 @@ TEST_CASE("a session's edits play from the rest to the committed state, and noth
       REQUIRE(picture.ok());
       CHECK(picture.value().revision == before->revision);
       CHECK(picture.value().field != nullptr);
-      const auto cloud = session->edited_cloud(picture.value(), 2);
+      const auto cloud = Session::edited_cloud(picture.value(), 2);
       if (frame == 0) CHECK(cloud->position == rest);
       if (frame == 10) CHECK(cloud->position == finest(*session).position);
       const Mat3d turned = Eigen::AngleAxisd(s * angle, Vec3d::UnitY()).toRotationMatrix();

@@ -477,7 +477,7 @@ TEST_CASE("the edited cloud keeps every attribute and the bits of what no edit m
   commit(*session, lift(0.5));
   const auto picture = session->committed_picture(1, false);
   REQUIRE(picture.ok());
-  const auto edited = session->edited_cloud(picture.value(), 1);
+  const auto edited = Session::edited_cloud(picture.value(), 1);
   const Cloud& now = *edited;
   CHECK(now.color == cloud->color);
   CHECK(now.id == cloud->id);
