@@ -45,6 +45,16 @@ struct DeformArgs {
   float* deformed_normal[3];
 };
 
+/// Two tangent vectors of each sample, and where the Jacobian takes them (Eq. 13). Columns of all samples, as
+/// in DeformArgs, whose normals are read and not written.
+struct CellArgs {
+  DeformArgs deform;
+  const float* cell_u[3];
+  const float* cell_v[3];
+  float* mapped_u[3];
+  float* mapped_v[3];
+};
+
 /// A level that has moved, and the next finer one.
 struct RaiseArgs {
   const std::uint32_t* blocks;
@@ -80,6 +90,9 @@ struct TurnArgs {
 
 /// Positions and normals of the samples of blocks[begin] .. blocks[end - 1].
 POINTWRIGHT_DECLARE_KERNEL(void deform_samples(const DeformArgs& args, std::size_t begin, std::size_t end))
+/// Positions, J u and J v of the samples of blocks[begin] .. blocks[end - 1]; where t = 0 all stay as they
+/// are. Of an offset along the normal J is that of the offset surface, folded or not.
+POINTWRIGHT_DECLARE_KERNEL(void deform_cells(const CellArgs& args, std::size_t begin, std::size_t end))
 /// Eq. (5) as a difference: p' = p + (r' - r) + d (g n' - n), g = 1 + t (gain - 1), and d' = g d.
 POINTWRIGHT_DECLARE_KERNEL(void raise_level(const RaiseArgs& args, std::size_t begin, std::size_t end))
 /// Normals of the samples of blocks[begin] .. blocks[end - 1] that move rigidly; the others are left alone.

@@ -13,10 +13,9 @@ Result<void> within(double value, double least, double greatest, const char* nam
   if (!std::isfinite(value))
     return Error{.code = ErrorCode::kNonFinite, .message = field + " is not a finite number", .field = field};
   if (value >= least && value <= greatest) return {};
-  return out_of_range(
-      field + " is " + std::to_string(value) + (value < least ? ", below " : ", above ") +
-          std::to_string(value < least ? least : greatest),
-      field, value < least ? least : greatest, value);
+  return out_of_range(field + " is " + std::to_string(value) + (value < least ? ", below " : ", above ") +
+                          std::to_string(value < least ? least : greatest),
+                      field, value < least ? least : greatest, value);
 }
 
 }  // namespace

@@ -1,0 +1,232 @@
+#include "engine/resampling/collection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/resampling/cells.h"
+
+namespace pointwright {
+namespace {
+
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+constexpr float kSqueezedArea = 0.7F;    // of the area at rest
+constexpr std::uint32_t kNearest = 6;    // among them the nearest on the same side is looked for
+constexpr std::size_t kMostRounds = 64;  // each halves the worst places; ten do for a squeeze by a thousand
+constexpr float kMostGrowth = 4.0F;      // of a cell that takes another one over
+constexpr std::size_t kMostVisited = 256;
+
+// Samples of an edited surface that may go, and those around them.
+class Collection {
+ public:
+  Collection(const MultiresSurface& surface, const Sampling& sampling, const ScaleField& field, float closest)
+      : surface_(surface),
+        sampling_(sampling),
+        closest_(closest),
+        cells_{.u = sampling.cell_u, .v = sampling.cell_v},
+        may_go_(sampling.size(), 0),
+        gone_(sampling.size(), 0) {
+    std::vector<std::uint8_t> near(sampling.size(), 0);
+    for (std::size_t i = 0; i < sampling.size(); ++i) {
+      if (!(field.t[i] > 0.0F) || !(sampling.spacing[i] > 0.0F) || !(area(i) < kSqueezedArea)) continue;
+      may_go_[i] = 1;
+      near[i] = 1;
+      for (std::uint32_t j = 0; j < sampling.graph->k; ++j) near[sampling.graph->index(i, j)] = 1;
+    }
+    for (std::size_t i = 0; i < near.size(); ++i)
+      if (near[i] != 0) members_.push_back(static_cast<std::uint32_t>(i));
+  }
+
+  // Removes one round of pairs. Returns whether there was one.
+  bool round() {
+    std::erase_if(members_, [this](std::uint32_t i) { return gone_[i] != 0; });
+    if (members_.size() < 2) return false;
+    const std::vector<std::uint32_t> nearest = nearest_of_members();
+    bool removed = false;
+    for (std::size_t m = 0; m < members_.size(); ++m) {
+      const std::uint32_t other = nearest[m];
+      if (other == kNone || other < m || nearest[other] != m) continue;
+      removed = remove_one(members_[m], members_[other]) || removed;
+    }
+    return removed;
+  }
+
+  [[nodiscard]] std::vector<std::uint32_t> survivors() const {
+    std::vector<std::uint32_t> order;
+    for (std::size_t i = 0; i < gone_.size(); ++i)
+      if (gone_[i] == 0) order.push_back(static_cast<std::uint32_t>(i));
+    return order;
+  }
+  [[nodiscard]] const std::vector<std::uint8_t>& gone() const { return gone_; }
+  [[nodiscard]] const Cells& cells() const { return cells_; }
+
+ private:
+  [[nodiscard]] float area(std::size_t i) const { return cells_.u[i].cross(cells_.v[i]).norm(); }
+  [[nodiscard]] Vec3f place(std::uint32_t i) const { return surface_.finest().position[i]; }
+
+  // By member: its nearest member on the same side, as a number of a member.
+  [[nodiscard]] std::vector<std::uint32_t> nearest_of_members() const {
+    Points points(members_.size());
+    for (std::size_t m = 0; m < members_.size(); ++m) points.set(m, place(members_[m]));
+    const NeighborGraph graph = build_neighbor_graph(points, kNearest);
+    std::vector<std::uint32_t> nearest(members_.size(), kNone);
+    parallel_for(members_.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t m = begin; m < end; ++m) nearest[m] = same_side(graph, points, m);
+    });
+    return nearest;
+  }
+
+  [[nodiscard]] std::uint32_t same_side(const NeighborGraph& graph, const Points& points,
+                                        std::size_t m) const {
+    const Points& normal = surface_.finest().normal;
+    const auto faces = [&](std::size_t other) {
+      return normal[members_[m]].dot(normal[members_[other]]) > 0.0F;
+    };
+    // Graphs list no exact copies; where these stand one after the other they are the nearest of all.
+    for (const std::size_t copy : {m + 1, m - 1}) {
+      const bool there = copy < members_.size() && points[copy] == points[m];
+      if (there && faces(copy) && (copy > m || m < 2 || points[m - 2] != points[m]))
+        return static_cast<std::uint32_t>(copy);
+    }
+    for (std::uint32_t j = 0; j < graph.k; ++j)
+      if (faces(graph.index(m, j))) return graph.index(m, j);
+    return kNone;
+  }
+
+  bool remove_one(std::uint32_t a, std::uint32_t b) {
+    const Vec3f way = place(b) - place(a);
+    if (!(way.norm() < closest_ * std::min(sampling_.spacing[a], sampling_.spacing[b]))) return false;
+    if (may_go_[a] == 0 && may_go_[b] == 0) return false;
+    const bool a_goes = may_go_[b] == 0 || (may_go_[a] != 0 && goes_before(a, b));
+    const std::uint32_t goes = a_goes ? a : b;
+    gone_[goes] = 1;
+    take_over(a_goes ? b : a, goes, way);
+    return true;
+  }
+
+  [[nodiscard]] bool goes_before(std::uint32_t a, std::uint32_t b) const {
+    const auto inserted = [this](std::uint32_t i) {
+      return !sampling_.parent.empty() && sampling_.parent[i] != kNoParent;
+    };
+    if (inserted(a) != inserted(b)) return inserted(a);
+    return sampling_.cloud->id[a] > sampling_.cloud->id[b];
+  }
+
+  // The cell of who stays grows along the way between the two.
+  void take_over(std::uint32_t stays, std::uint32_t goes, const Vec3f& way) {
+    const float own = area(stays);
+    const float length = way.norm();
+    if (!(own > 0.0F) || !(length > 0.0F)) return;
+    const float growth = std::min(1.0F + area(goes) / own, kMostGrowth) - 1.0F;
+    const Vec3f direction = way / length;
+    for (Points* sides : {&cells_.u, &cells_.v}) {
+      const Vec3f side = (*sides)[stays];
+      sides->set(stays, side + growth * side.dot(direction) * direction);
+    }
+  }
+
+  const MultiresSurface& surface_;
+  const Sampling& sampling_;
+  const float closest_;
+  Cells cells_;
+  std::vector<std::uint8_t> may_go_;
+  std::vector<std::uint8_t> gone_;
+  std::vector<std::uint32_t> members_;  // ascending
+};
+
+// The row of sample i without who is gone: its neighbours, and where these are too few, theirs.
+void fill_row(const NeighborGraph& graph, const std::vector<std::uint8_t>& gone, const Points& position,
+              std::uint32_t i, std::vector<std::uint32_t>& row) {
+  struct Near {
+    float distance;
+    std::uint32_t sample;
+  };
+  std::vector<std::uint32_t> visited{i};
+  std::vector<Near> alive;
+  for (std::size_t next = 0; next < visited.size(); ++next) {
+    // Whole rings only, and one beyond what would be enough: the nearest may be a ring farther out.
+    if (alive.size() >= 2 * std::size_t{graph.k} || visited.size() >= kMostVisited) break;
+    for (std::uint32_t j = 0; j < graph.k; ++j) {
+      const std::uint32_t other = graph.index(visited[next], j);
+      if (std::find(visited.begin(), visited.end(), other) != visited.end()) continue;
+      visited.push_back(other);
+      const float distance = (position[other] - position[i]).squaredNorm();
+      if (gone[other] == 0 && distance > 0.0F) alive.push_back({distance, other});
+    }
+  }
+  std::sort(alive.begin(), alive.end(), [](const Near& a, const Near& b) {
+    return a.distance < b.distance || (a.distance == b.distance && a.sample < b.sample);
+  });
+  row.clear();
+  for (std::uint32_t j = 0; j < graph.k && !alive.empty(); ++j)
+    row.push_back(alive[std::min<std::size_t>(j, alive.size() - 1)].sample);
+}
+
+NeighborGraph survivors_graph(const NeighborGraph& graph, const std::vector<std::uint8_t>& gone,
+                              const std::vector<std::uint32_t>& order, const Points& position) {
+  std::vector<std::uint32_t> number(gone.size(), 0);
+  for (std::size_t m = 0; m < order.size(); ++m) number[order[m]] = static_cast<std::uint32_t>(m);
+  NeighborGraph left{.count = order.size(), .k = graph.k, .lanes = {}, .duplicate_count = 0};
+  left.lanes.resize(padded_to_block(left.count) * left.k, 0);
+  parallel_for(order.size(), [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> row;
+    for (std::size_t m = begin; m < end; ++m) {
+      row.clear();
+      bool whole = true;
+      for (std::uint32_t j = 0; j < graph.k; ++j) {
+        row.push_back(graph.index(order[m], j));
+        whole = whole && gone[row.back()] == 0;
+      }
+      if (!whole) fill_row(graph, gone, position, order[m], row);
+      for (std::uint32_t j = 0; j < graph.k; ++j)
+        left.index(m, j) = row.empty() ? static_cast<std::uint32_t>(m) : number[row[j]];
+    }
+  });
+  return left;
+}
+
+template <typename T>
+std::vector<T> gathered(const std::vector<T>& column, const std::vector<std::uint32_t>& order) {
+  std::vector<T> result;
+  if (column.empty()) return result;
+  result.reserve(order.size());
+  for (const std::uint32_t i : order) result.push_back(column[i]);
+  return result;
+}
+
+Points gathered(const Points& column, const std::vector<std::uint32_t>& order) {
+  Points result(order.size());
+  for (std::size_t m = 0; m < order.size(); ++m) result.set(m, column[order[m]]);
+  return result;
+}
+
+}  // namespace
+
+void collect(const ScaleField& field, float closest, ResampledEdit& result) {
+  const Sampling& sampling = *result.sampling;
+  Collection collection(result.surface, sampling, field, closest);
+  for (std::size_t round = 0; round < kMostRounds && collection.round(); ++round) {
+  }
+  const std::vector<std::uint32_t> order = collection.survivors();
+  result.removed = sampling.size() - order.size();
+  if (result.removed == 0) return;
+  auto left = std::make_shared<Sampling>();
+  left->cloud = std::make_shared<const Cloud>(permuted(*sampling.cloud, order));
+  left->graph = std::make_shared<const NeighborGraph>(
+      survivors_graph(*sampling.graph, collection.gone(), order, result.surface.finest().position));
+  left->spacing = gathered(sampling.spacing, order);
+  left->parent = gathered(sampling.parent, order);
+  left->cell_u = gathered(collection.cells().u, order);
+  left->cell_v = gathered(collection.cells().v, order);
+  left->next_id = sampling.next_id;
+  for (Level& level : result.surface.levels) {
+    level.position = gathered(level.position, order);
+    level.normal = gathered(level.normal, order);
+  }
+  for (std::vector<float>& detail : result.surface.detail) detail = gathered(detail, order);
+  result.sampling = std::move(left);
+}
+
+}  // namespace pointwright
