@@ -14,7 +14,8 @@ protocol::FrameState frame_state(const Picture& picture, std::uint32_t level) {
           .revision = picture.revision,
           .sequence = picture.sequence,
           .origin = picture.samples->cloud().origin,
-          .detail_range = picture.detail_range};
+          .detail_range = picture.detail_range,
+          .stretch_range = picture.samples->stretch_range};
 }
 
 protocol::FrameLayout layout_of(const Picture& picture) {
@@ -32,12 +33,13 @@ protocol::FrameColumns frame_columns(const Picture& picture, std::uint32_t level
   protocol::FrameColumns columns;
   columns.position = &picture.surface->levels[level].position;
   columns.normal = &picture.surface->levels[level].normal;
-  if (picture.field != nullptr) columns.t = std::span(picture.field->t).first(n);
+  if (picture.t != nullptr) columns.t = std::span(*picture.t).first(n);
   // The detail of a level is what carries it to the next finer one; of the finest one, what carried it there.
   if (picture.surface->band_count() > 0)
     columns.detail =
         std::span(picture.surface->detail[std::min<std::size_t>(level, picture.surface->band_count() - 1)])
             .first(n);
+  columns.stretch = picture.samples->stretch;
   columns.color = picture.samples->cloud().color;
   columns.marks = *picture.marks;
   columns.ids = picture.samples->cloud().id;
@@ -73,16 +75,19 @@ void Display::publish(Picture picture) {
   after->picture = std::move(picture);
   after->bounds = protocol::surface_bounds(after->picture.surface->finest().position);
   const Picture& now = after->picture;
-  if (before == nullptr) {
-    after->version = after->key_version = 1;
+  if (before == nullptr || !are_same(*before->picture.samples, *now.samples)) {
+    // Other samples have other places in frames, and their own ids and radii.
+    after->version = after->key_version = before == nullptr ? 1 : before->version + 1;
     after->layout = layout_of(now);
-    after->block_versions.assign(after->layout.block_count(), 1);
+    after->block_versions.assign(after->layout.block_count(), after->version);
   } else {
     after->version = before->version + 1;
     after->key_version = before->key_version;
     after->layout = before->layout;
     after->block_versions = before->block_versions;
-    if (now.detail_range != before->picture.detail_range) after->key_version = after->version;
+    if (now.detail_range != before->picture.detail_range ||
+        now.samples->stretch_range != before->picture.samples->stretch_range)
+      after->key_version = after->version;
     const auto changed =
         protocol::changed_blocks(after->layout, frame_columns(before->picture, finest_level(now)),
                                  frame_columns(now, finest_level(now)), protocol::kAllFrameAttributes);

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "engine/editing/painting.h"
-#include "engine/editing/scale_field.h"
 #include "engine/multires/surface.h"
 #include "protocol/frames/frame.h"
 #include "protocol/frames/layout.h"
@@ -18,7 +17,7 @@ namespace pointwright::server {
 /// One thing shown. Immutable once published.
 struct Picture {
   std::shared_ptr<const MultiresSurface> surface;
-  std::shared_ptr<const ScaleField> field;  ///< null: t is 0 everywhere
+  std::shared_ptr<const std::vector<float>> t;  ///< may be padded; null: 0 everywhere
   std::shared_ptr<const Marks> marks;
   SharedSamples samples;
   float detail_range = 0.0F;
@@ -44,8 +43,8 @@ class Display {
     std::uint64_t version = 0;
   };
   /// The frame that brings a viewer which saw `version` (0: nothing) to the newest picture: a delta with the
-  /// blocks that changed since, or a key where the ranges differ. Frames are shared by all viewers that ask
-  /// for the same one.
+  /// blocks that changed since, or a key where the samples or the ranges differ. Frames are shared by all
+  /// viewers that ask for the same one.
   Frame frame_since(std::uint64_t version, std::uint16_t attributes);
 
  private:
