@@ -35,6 +35,7 @@ class PaintedField {
                                                const ExecutionContext* context = nullptr) const;
 
   [[nodiscard]] const std::shared_ptr<const ScaleField>& field() const { return field_; }
+  [[nodiscard]] const RegionPair& regions() const { return regions_; }
   [[nodiscard]] Blend blend() const { return blend_; }
   /// Samples whose t the last repainted() computed anew; all of them after make().
   [[nodiscard]] std::size_t computed_samples() const { return computed_; }

@@ -11,11 +11,10 @@ constexpr std::size_t kKeptSurfaces = 2;
 
 Drag::Drag(const RestModel& rest, SurfaceState state, std::shared_ptr<const ScaleField> field,
            const EditParams& params)
-    : origin_(rest.cloud->origin),
+    : origin_(rest.origin),
       state_(std::move(state)),
       field_(std::move(field)),
-      graph_(rest.graph),
-      plan_(*state_.surface, *graph_, params, *field_),
+      plan_(*state_.surface, state_.samples->graph(), params, *field_),
       free_(kKeptSurfaces) {}
 
 bool Drag::serves(const SurfaceState& state, const std::shared_ptr<const ScaleField>& field,

@@ -31,7 +31,6 @@ class Drag {
   const Vec3d origin_;
   const SurfaceState state_;
   const std::shared_ptr<const ScaleField> field_;
-  const std::shared_ptr<const NeighborGraph> graph_;
   const EditPlan plan_;
   // Surfaces that nobody looks at any more, equal to the drag's but for what moves.
   Recycler<MultiresSurface> free_;
