@@ -36,23 +36,25 @@ Fate fate_of(std::size_t block, const ScaleField& field) {
 }  // namespace
 
 EditPlan::EditPlan(const MultiresSurface& surface, const NeighborGraph& graph, const EditParams& params,
-                   const ScaleField& field, const ExecutionContext* context)
+                   const ScaleField& field, const ExecutionContext* context, BlockRange range)
     : level_(params.level),
       rigid_only_(is_rigid(params)),
       offsets_(needs_shape_operators(params.deformation)) {
   const std::size_t n = surface.sample_count();
   POINTWRIGHT_CHECK(graph.count == n && field.size() == n, "a graph and a field of the same samples");
   POINTWRIGHT_CHECK(level_ <= surface.band_count(), "a level of the surface");
-  std::vector<Fate> fates(padded_to_block(n) / kSimdBlock);
+  const std::size_t last = std::min<std::size_t>(range.end, padded_to_block(n) / kSimdBlock);
+  const std::size_t first = std::min<std::size_t>(range.begin, last);
+  std::vector<Fate> fates(last - first);
   parallel_for(
       fates.size(),
       [&](std::size_t begin, std::size_t end) {
-        for (std::size_t b = begin; b < end; ++b) fates[b] = fate_of(b, field);
+        for (std::size_t b = begin; b < end; ++b) fates[b] = fate_of(first + b, field);
       },
       kParallelBlock / kSimdBlock, context);
   for (std::size_t b = 0; b < fates.size(); ++b) {
     if (fates[b] == Fate::kStays) continue;
-    const auto block = static_cast<std::uint32_t>(b);
+    const auto block = static_cast<std::uint32_t>(first + b);
     moving_.push_back(block);
     if (rigid_only_ && fates[b] == Fate::kRigid) {
       rigid_.push_back(block);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "engine/core/execution_context.h"
@@ -12,16 +13,25 @@
 
 namespace pointwright {
 
+/// Blocks of kSimdBlock samples [begin, end).
+struct BlockRange {
+  std::uint32_t begin = 0;
+  std::uint32_t end = std::numeric_limits<std::uint32_t>::max();  ///< beyond the last one: all that there are
+};
+
 /// Made once the regions or the surface change, not per frame. Immutable; the surface, the graph and the
 /// field that it was made of must outlive it and stay as they were.
 class EditPlan {
  public:
+  /// `range`: the blocks that the plan moves, the others stay. A plan of a range and one of the rest, one
+  /// after the other, make the bits of one plan of all, where no sample of the first range has a neighbour
+  /// in the second.
   /// Of `params`, the level, the kinds of deformation and whether there are gains count, not their amounts.
   /// Cost:    O(N k) for each level finer than params.level, parallel; there 4 k + 16 bytes a sample that may
   ///          bend
   /// Cancels: between blocks; the plan is then incomplete and must be dropped
   EditPlan(const MultiresSurface& surface, const NeighborGraph& graph, const EditParams& params,
-           const ScaleField& field, const ExecutionContext* context = nullptr);
+           const ScaleField& field, const ExecutionContext* context = nullptr, BlockRange range = {});
 
   /// Whether edits with these parameters can be made from this plan. All plans that serve the same parameters
   /// make the same bits of them.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/core/parallel.h"
+#include "engine/multires/normal_stencil.h"
 
 namespace pointwright {
 namespace {
@@ -95,12 +96,18 @@ void append_children(const Inserted& inserted, NeighborGraph& graph) {
   });
 }
 
-Cells divided_rest_cells(const Inserted& inserted, const Cells& rest, const Cells& mapped,
-                         const Points& normal) {
+void divide_cells(const Inserted& inserted, const Cells& rest, const DeformMap& map, const ScaleField& field,
+                  const Level& level, const ShapeOperators* shape, Cells& cells) {
   const std::size_t before = rest.u.size();
-  Cells cells = rest;
-  cells.u.resize(before + inserted.count());
-  cells.v.resize(before + inserted.count());
+  const std::size_t count = inserted.count();
+  if (count == 0) return;
+  // The children alone, as columns of their own.
+  Level children{.position = Points(count), .normal = Points(count)};
+  Cells parts{.u = Points(count), .v = Points(count)};
+  ScaleField part{.t = std::vector<float>(padded_to_block(count), 0.0F), .gradient = Points(count)};
+  ShapeOperators bent;
+  if (shape != nullptr)
+    for (auto* column : {&bent.uu, &bent.uv, &bent.vv}) column->resize(padded_to_block(count));
   const auto& splits = inserted.splits.splits;
   parallel_for(
       splits.size(),
@@ -108,22 +115,39 @@ Cells divided_rest_cells(const Inserted& inserted, const Cells& rest, const Cell
         for (std::size_t s = begin; s < end; ++s) {
           const Split& split = splits[s];
           const std::uint32_t i = split.sample;
-          const PrincipalStretch stretch = principal_stretch(mapped.u[i], mapped.v[i]);
-          const Vec3f along =
-              (stretch.cosine * rest.u[i] + stretch.sine * rest.v[i]) / static_cast<float>(split.major);
-          const Vec3f across =
-              (stretch.cosine * rest.v[i] - stretch.sine * rest.u[i]) / static_cast<float>(split.minor);
-          cells.u.set(i, along);
-          cells.v.set(i, across);
-          for (std::uint32_t c = 0; c < split.children(); ++c) {
-            const std::size_t child = before + split.first_child + c;
-            cells.u.set(child, in_plane(along, normal[child]));
-            cells.v.set(child, in_plane(across, normal[child]));
+          const auto major = static_cast<float>(split.major);
+          const auto minor = static_cast<float>(split.minor);
+          const Vec3f u = cells.u[i];
+          const Vec3f v = cells.v[i];
+          const PrincipalStretch stretch = principal_stretch(u, v);
+          cells.u.set(i, (stretch.cosine * u + stretch.sine * v) / major);
+          cells.v.set(i, (stretch.cosine * v - stretch.sine * u) / minor);
+          const Vec3f along = (stretch.cosine * rest.u[i] + stretch.sine * rest.v[i]) / major;
+          const Vec3f across = (stretch.cosine * rest.v[i] - stretch.sine * rest.u[i]) / minor;
+          for (std::uint32_t c = split.first_child; c < split.first_child + split.children(); ++c) {
+            const Vec3f normal = level.normal[before + c];
+            children.position.set(c, level.position[before + c]);
+            children.normal.set(c, normal);
+            parts.u.set(c, in_plane(along, normal));
+            parts.v.set(c, in_plane(across, normal));
+            part.t[c] = field.t[before + c];
+            part.gradient.set(c, field.gradient[before + c]);
+            if (shape == nullptr) continue;
+            bent.uu[c] = shape->uu[before + c];
+            bent.uv[c] = shape->uv[before + c];
+            bent.vv[c] = shape->vv[before + c];
           }
         }
       },
       kChildrenOfRange);
-  return cells;
+  const MappedCells mapped = map_cells(map, NormalStencil::all_blocks(count), part, children, parts,
+                                       shape != nullptr ? &bent : nullptr);
+  cells.u.resize(before + count);
+  cells.v.resize(before + count);
+  for_children(count, [&](std::size_t child) {
+    cells.u.set(before + child, mapped.cells.u[child]);
+    cells.v.set(before + child, mapped.cells.v[child]);
+  });
 }
 
 Cloud with_children(const Inserted& inserted, const Cloud& cloud, const Level& finest,

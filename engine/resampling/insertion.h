@@ -37,11 +37,13 @@ void append_children(const Points& position, const RegionPair& regions, Blend bl
 /// Appends rows of the children: the nearest of the samples that there were before, at rest.
 void append_children(const Inserted& inserted, NeighborGraph& graph);
 
-/// Cells with those of the samples that split divided along their principal axes, the children's appended:
-/// their parents' parts, turned into their own tangent planes.
-/// Shapes: `rest` and `mapped` of the samples before; `normal` of all
-Cells divided_rest_cells(const Inserted& inserted, const Cells& rest, const Cells& mapped,
-                         const Points& normal);
+/// Divides the mapped cells of the samples that split along their principal axes, and appends those of the
+/// children: their parents' parts at rest, turned into their own tangent planes and mapped where they are.
+/// Shapes: `rest` and `cells` (mapped) of the samples before; `field`, `level` and `shape`, which may be null
+///         as in deform(), of all
+/// Cost:   O(C), parallel
+void divide_cells(const Inserted& inserted, const Cells& rest, const DeformMap& map, const ScaleField& field,
+                  const Level& level, const ShapeOperators* shape, Cells& cells);
 
 /// The cloud with the children's attributes, ids from `next_id` on, and their places as `surface` has them.
 /// Cost: a copy of the cloud

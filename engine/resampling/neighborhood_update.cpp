@@ -4,21 +4,14 @@
 #include <limits>
 
 #include "engine/core/parallel.h"
+#include "engine/resampling/nearest_few.h"
 
 namespace pointwright {
 namespace {
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kSamplesOfRange = 512;
-
-struct Near {
-  float distance = 0.0F;  // squared
-  std::uint32_t sample = 0;
-  friend bool operator<(const Near& a, const Near& b) {
-    return a.distance < b.distance || (a.distance == b.distance && a.sample < b.sample);
-  }
-  friend bool operator==(const Near&, const Near&) = default;
-};
+constexpr std::uint32_t kMostNeighbors = 32;  // of a hierarchy's graph
 
 class Update {
  public:
@@ -37,32 +30,31 @@ class Update {
   }
 
   // The row of sample i, `old` the one of before that its candidates come from.
-  void set_row(std::size_t i, std::uint32_t old, std::vector<Near>& found, NeighborGraph& graph) const {
-    found.clear();
+  void set_row(std::size_t i, std::uint32_t old, NeighborGraph& graph) const {
+    NearestFew<kMostNeighbors> nearest(graph.k);
     const Vec3f here = position_[i];
     const auto consider = [&](std::uint32_t j) {
       const float distance = (position_[j] - here).squaredNorm();
-      if (distance > 0.0F) found.push_back({.distance = distance, .sample = j});  // neither itself nor a copy
+      if (distance > 0.0F) nearest.consider(distance, j);  // neither itself nor a copy
     };
     const auto consider_family = [&](std::uint32_t sample) {
       consider(sample);
       if (split_of_[sample] == kNone) return;
       const Split& split = inserted_.splits.splits[split_of_[sample]];
-      for (std::uint32_t c = 0; c < split.children(); ++c)
-        consider(static_cast<std::uint32_t>(before_.count) + split.first_child + c);
+      const auto first = static_cast<std::uint32_t>(before_.count) + split.first_child;
+      for (std::uint32_t c = first; c < first + split.children(); ++c) consider(c);
     };
     consider_family(old);
-    for (std::uint32_t j = 0; j < before_.k; ++j) consider_family(before_.index(old, j));
     if (split_of_[old] != kNone) {
       const RestPatch& patch = inserted_.patches.of(old);
       for (std::uint32_t r = 0; r < patch.ring_size; ++r) consider_family(patch.ring[r]);
+    } else {
+      for (std::uint32_t j = 0; j < before_.k; ++j) consider_family(before_.index(old, j));
     }
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
     for (std::uint32_t j = 0; j < graph.k; ++j) {
       // All at one place: whoever was near before.
       graph.index(i, j) =
-          found.empty() ? before_.index(old, j) : found[std::min<std::size_t>(j, found.size() - 1)].sample;
+          nearest.count() == 0 ? before_.index(old, j) : nearest[std::min(j, nearest.count() - 1)];
     }
   }
 
@@ -84,12 +76,11 @@ NeighborGraph updated_neighborhoods(const NeighborGraph& before, const Inserted&
   parallel_for(
       graph.count,
       [&](std::size_t begin, std::size_t end) {
-        std::vector<Near> found;
         for (std::size_t i = begin; i < end; ++i) {
           if (i >= before.count)
-            update.set_row(i, inserted.split(i - before.count).sample, found, graph);
+            update.set_row(i, inserted.split(i - before.count).sample, graph);
           else if (update.touches(i))
-            update.set_row(i, static_cast<std::uint32_t>(i), found, graph);
+            update.set_row(i, static_cast<std::uint32_t>(i), graph);
         }
       },
       kSamplesOfRange);

@@ -8,59 +8,61 @@
 #include "engine/core/parallel.h"
 #include "engine/editing/deformation_map.h"
 #include "engine/multires/normal_stencil.h"
+#include "engine/resampling/relaxation_kernels.h"
 
 namespace pointwright {
 namespace {
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-constexpr std::uint32_t kMostNeighbors = 32;  // of a list; a disc of the radius below holds about 20
-constexpr std::uint32_t kSweepsOfList = 4;
-constexpr float kRadius = 1.9F;      // of repulsion, in local spacings
-constexpr float kListRadius = 1.3F;  // what may come within the radius until the lists are made anew
+constexpr std::uint32_t kSweepsOfF = 4;     // until F and U are evaluated anew
+constexpr std::uint32_t kSweepsOfList = 4;  // and the lists
+constexpr float kRadius = 1.9F;             // of repulsion, in local spacings
+constexpr float kListRadius = 1.3F;         // what may come within the radius until the lists are made anew
 constexpr float kGain = 1.2F;
-constexpr float kLeastWeight = 4.0F;  // lone neighbours must not throw a sample
-constexpr float kMostStep = 0.125F;   // of the radius, in one sweep
-constexpr float kLeastLocal = 0.3F;   // of the spacing wanted: local cells are taken to lie within
+constexpr float kMostStep = 0.125F;  // of the radius, in one sweep
+constexpr float kLeastLocal = 0.3F;  // of the spacing wanted: local cells are taken to lie within
 constexpr float kMostLocal = 1.5F;
-constexpr float kMostWay = 0.5F;      // from the place of birth, in cells at rest
+constexpr float kMostWay = 0.65F;     // from the place of birth, in cells at rest
 constexpr float kLeastPlane = 1e-6F;  // least det(U^T U) / trace² of a cell that is not folded flat
 constexpr std::size_t kChildrenOfRange = 512;
 
-// Children where the deformation has them.
-struct Evaluated {
-  Points position;
-  Points along_x, along_y;  // U: J of the patch's tangents there
-};
+static_assert(kMostFamilies == kRingSize + 1);
 
 class Relaxation {
  public:
-  Relaxation(const RelaxationScene& scene, Births& births)
+  Relaxation(const RelaxationScene& scene, Births& births, RelaxationMemory& memory)
       : scene_(scene),
         births_(births),
+        memory_(memory),
         born_x_(births.x),
         born_y_(births.y),
-        split_of_(scene.sampling.size(), kNone),
-        count_(births.x.size(), 0),
-        radius_(births.x.size(), 0.0F),
-        neighbors_(births.x.size() * kMostNeighbors),
-        moved_(births.x.size()) {
-    for (std::size_t s = 0; s < scene.splits.splits.size(); ++s)
-      split_of_[scene.splits.splits[s].sample] = static_cast<std::uint32_t>(s);
+        rings_(scene.splits.splits.size()),
+        radius_(padded_to_block(births.x.size()), 0.0F),
+        list_radius_(radius_.size(), 0.0F),
+        count_(radius_.size(), 0),
+        list_(radius_.size() * kMostRepelling),
+        aside_(births.x.size()),
+        push_(births.x.size()) {
+    place_samples();
+    make_rings();
   }
 
   void run(std::uint32_t sweeps, const ExecutionContext* context) {
     for (std::uint32_t sweep = 0; sweep < sweeps; ++sweep) {
       if (context != nullptr && context->is_cancelled()) return;
-      if (sweep % kSweepsOfList == 0) {
-        evaluate();
-        for_children([this](std::size_t child) { list_neighbors(child); });
-      }
+      if (sweep % kSweepsOfF == 0) evaluate();
+      if (sweep % kSweepsOfList == 0) list_neighbors();
+      repel_all();
       for_children([this](std::size_t child) { move(child); });
-      std::swap(now_.position, moved_);
     }
   }
 
  private:
+  [[nodiscard]] std::size_t before() const { return scene_.sampling.size(); }
+  [[nodiscard]] const Split& split(std::size_t child) const {
+    return scene_.splits.splits[births_.split[child]];
+  }
+
   template <typename Body>
   void for_children(const Body& body) {
     parallel_for(
@@ -71,8 +73,53 @@ class Relaxation {
         kChildrenOfRange);
   }
 
-  [[nodiscard]] const Split& split(std::size_t child) const {
-    return scene_.splits.splits[births_.split[child]];
+  // Places of the samples that were there before. Memory that was used before has those that do not move.
+  void place_samples() {
+    Points& places = memory_.places;
+    const bool fresh = places.size() < before();
+    if (fresh) places = scene_.deformed;
+    // Kernels read whole vectors from any child on.
+    places.resize(before() + births_.x.size() + kSimdBlock);
+    if (fresh) return;
+    parallel_for(
+        scene_.blocks.size(),
+        [&](std::size_t begin, std::size_t end) {
+          for (std::size_t entry = begin; entry < end; ++entry) {
+            const std::size_t first = std::size_t{scene_.blocks[entry]} * kSimdBlock;
+            for (std::size_t i = first; i < std::min(first + kSimdBlock, before()); ++i)
+              places.set(i, scene_.deformed[i]);
+          }
+        },
+        kParallelBlock / kSimdBlock);
+  }
+
+  void make_rings() {
+    const std::vector<Split>& splits = scene_.splits.splits;
+    std::vector<std::uint32_t>& split_of = memory_.split_of;
+    split_of.resize(before(), kNone);
+    for (std::size_t s = 0; s < splits.size(); ++s)
+      split_of[splits[s].sample] = static_cast<std::uint32_t>(s);
+    parallel_for(
+        splits.size(),
+        [&](std::size_t begin, std::size_t end) {
+          for (std::size_t s = begin; s < end; ++s) set_ring(splits[s].sample, rings_[s]);
+        },
+        kChildrenOfRange);
+    for (const Split& each : splits) split_of[each.sample] = kNone;
+  }
+
+  void set_ring(std::uint32_t sample, FamilyRing& ring) const {
+    const RestPatch& patch = scene_.patches.of(sample);
+    ring.count = patch.ring_size + 1;
+    for (std::uint32_t r = 0; r < ring.count; ++r) {
+      const std::uint32_t member = r == 0 ? sample : patch.ring[r - 1];
+      const std::uint32_t s = memory_.split_of[member];
+      ring.sample[r] = member;
+      ring.begin[r] = ring.end[r] = 0;
+      if (s == kNone) continue;
+      ring.begin[r] = static_cast<std::uint32_t>(before()) + scene_.splits.splits[s].first_child;
+      ring.end[r] = ring.begin[r] + scene_.splits.splits[s].children();
+    }
   }
 
   // F and U of all children from where they stand at rest.
@@ -100,9 +147,15 @@ class Relaxation {
     const ScaleField field = compute_scale_field(rest.position, scene_.regions, scene_.blend);
     MappedCells mapped = map_cells(scene_.map, NormalStencil::all_blocks(count), field, rest, tangents,
                                    offsets ? &shape : nullptr);
-    now_ = {.position = std::move(mapped.position),
-            .along_x = std::move(mapped.cells.u),
-            .along_y = std::move(mapped.cells.v)};
+    along_x_ = std::move(mapped.cells.u);
+    along_y_ = std::move(mapped.cells.v);
+    for_children([&](std::size_t child) {
+      memory_.places.set(before() + child, mapped.position[child]);
+      const float length = along_x_[child].norm();
+      aside_.set(child, length > 0.0F ? Vec3f(along_x_[child] / length) : Vec3f::Zero());
+      radius_[child] = repulsion_radius(child);
+      list_radius_[child] = kListRadius * radius_[child];
+    });
   }
 
   // Weingarten: dn of the jet, in the tangent frame of its normal.
@@ -137,61 +190,51 @@ class Relaxation {
     const Split& own = split(child);
     const float wanted = wanted_spacing(scene_.sampling.spacing[own.sample], scene_.params, scene_.coarser);
     const float area =
-        now_.along_x[child].cross(now_.along_y[child]).norm() *
+        along_x_[child].cross(along_y_[child]).norm() *
         rest_area(scene_.rest.u[own.sample], scene_.rest.v[own.sample], scene_.sampling.spacing[own.sample]) /
         static_cast<float>(own.major * own.minor);
     return kRadius * std::clamp(std::sqrt(area), kLeastLocal * wanted, kMostLocal * wanted);
   }
 
-  // Positions of samples that were there before, then of children.
-  [[nodiscard]] Vec3f place(std::uint32_t index) const {
-    const std::size_t before = scene_.sampling.size();
-    return index < before ? scene_.deformed[index] : now_.position[index - before];
+  void list_neighbors() {
+    const Points& places = memory_.places;
+    const NearArgs args{.place = {places.x(), places.y(), places.z()},
+                        .first_child = static_cast<std::uint32_t>(before()),
+                        .ring = rings_.data(),
+                        .ring_of = births_.split.data(),
+                        .radius = list_radius_.data(),
+                        .list = list_.data(),
+                        .count = count_.data()};
+    const auto kernel = POINTWRIGHT_KERNEL(list_near);
+    parallel_for(
+        births_.x.size(), [&](std::size_t begin, std::size_t end) { kernel(args, begin, end); },
+        kChildrenOfRange);
   }
 
-  void list_neighbors(std::size_t child) {
-    const auto before = static_cast<std::uint32_t>(scene_.sampling.size());
-    const Vec3f here = now_.position[child];
-    const float reach = kListRadius * (radius_[child] = repulsion_radius(child));
-    std::uint32_t* list = neighbors_.data() + child * kMostNeighbors;
-    std::array<float, kMostNeighbors> distance{};
-    std::uint32_t count = 0;
-    const auto consider = [&](std::uint32_t index) {
-      const float d = (place(index) - here).squaredNorm();
-      if (d >= reach * reach || index == before + child) return;
-      if (count < kMostNeighbors) {
-        distance[count] = d;
-        list[count++] = index;
-        return;
-      }
-      // More than ever count: the nearest stay.
-      const auto farthest = std::max_element(distance.begin(), distance.end());
-      if (d >= *farthest) return;
-      list[farthest - distance.begin()] = index;
-      *farthest = d;
-    };
-    const auto consider_family = [&](std::uint32_t sample) {
-      consider(sample);
-      if (split_of_[sample] == kNone) return;
-      const Split& family = scene_.splits.splits[split_of_[sample]];
-      for (std::uint32_t c = 0; c < family.children(); ++c) consider(before + family.first_child + c);
-    };
-    const RestPatch& patch = scene_.patches.of(split(child).sample);
-    consider_family(split(child).sample);
-    for (std::uint32_t r = 0; r < patch.ring_size; ++r) consider_family(patch.ring[r]);
-    count_[child] = count;
+  void repel_all() {
+    const Points& places = memory_.places;
+    const RepelArgs args{.place = {places.x(), places.y(), places.z()},
+                         .first_child = static_cast<std::uint32_t>(before()),
+                         .list = list_.data(),
+                         .count = count_.data(),
+                         .radius = radius_.data(),
+                         .aside = {aside_.x(), aside_.y(), aside_.z()},
+                         .push = {push_.x(), push_.y(), push_.z()}};
+    const auto kernel = POINTWRIGHT_KERNEL(repel);
+    parallel_for(
+        radius_.size() / kSimdBlock, [&](std::size_t begin, std::size_t end) { kernel(args, begin, end); },
+        kChildrenOfRange / kSimdBlock);
   }
 
   void move(std::size_t child) {
-    moved_.set(child, now_.position[child]);
-    const Vec3f ux = now_.along_x[child];
-    const Vec3f uy = now_.along_y[child];
+    const Vec3f ux = along_x_[child];
+    const Vec3f uy = along_y_[child];
     const float a = ux.squaredNorm();
     const float b = ux.dot(uy);
     const float c = uy.squaredNorm();
     const float determinant = a * c - b * b;
     if (!(determinant > kLeastPlane * (a + c) * (a + c))) return;
-    const Vec3f push = repulsion(child);
+    const Vec3f push = kGain * push_[child];
     // The displacement's part in the tangent plane, at rest.
     const float p = ux.dot(push);
     const float q = uy.dot(push);
@@ -207,51 +250,26 @@ class Relaxation {
     const float old_y = births_.y[child];
     confine(child, old_x + dx, old_y + dy);
     const Vec3f gone = (births_.x[child] - old_x) * ux + (births_.y[child] - old_y) * uy;
-    moved_.set(child, now_.position[child] + gone);
+    memory_.places.set(before() + child, memory_.places[before() + child] + gone);
   }
 
-  [[nodiscard]] Vec3f repulsion(std::size_t child) const {
-    const Vec3f here = now_.position[child];
-    const float radius = radius_[child];
-    Vec3f sum = Vec3f::Zero();
-    float weight = 0.0F;
-    const std::uint32_t* list = neighbors_.data() + child * kMostNeighbors;
-    for (std::uint32_t n = 0; n < count_[child]; ++n) {
-      const Vec3f away = here - place(list[n]);
-      const float distance = away.norm();
-      if (distance >= radius) continue;
-      weight += 1.0F;
-      if (distance > 0.0F) {
-        sum += (1.0F - distance / radius) / distance * away;
-      } else {
-        // Born at the same place: one goes one way, the other the other way.
-        const float side = list[n] < scene_.sampling.size() + child ? 1.0F : -1.0F;
-        sum += side * now_.along_x[child].normalized();
-      }
-    }
-    return kGain * radius / std::max(weight, kLeastWeight) * sum;
-  }
-
-  // Half a cell from the place of birth at most; beyond the parent's own half cell only toward neighbours.
+  // Not too far from the place of birth; beyond the parent's own half cell only toward neighbours.
   void confine(std::size_t child, float x, float y) {
     const Split& own = split(child);
-    const float half = kMostWay * std::sqrt(rest_area(scene_.rest.u[own.sample], scene_.rest.v[own.sample],
-                                                      scene_.sampling.spacing[own.sample]));
-    float way_x = x - born_x_[child];
-    float way_y = y - born_y_[child];
+    const float cell = std::sqrt(
+        rest_area(scene_.rest.u[own.sample], scene_.rest.v[own.sample], scene_.sampling.spacing[own.sample]));
+    const float way_x = x - born_x_[child];
+    const float way_y = y - born_y_[child];
     const float way = std::sqrt(way_x * way_x + way_y * way_y);
-    if (way > half) {
-      way_x *= half / way;
-      way_y *= half / way;
-    }
-    x = born_x_[child] + way_x;
-    y = born_y_[child] + way_y;
+    const float kept = way > kMostWay * cell ? kMostWay * cell / way : 1.0F;
+    x = born_x_[child] + kept * way_x;
+    y = born_y_[child] + kept * way_y;
     const float distance = std::sqrt(x * x + y * y);
-    if (distance > half) {
+    if (distance > 0.5F * cell) {
       const RestPatch& patch = scene_.patches.of(own.sample);
       const Vec3f direction = x / distance * patch.u + y / distance * patch.v;
       const float born = std::sqrt(born_x_[child] * born_x_[child] + born_y_[child] * born_y_[child]);
-      float reach = std::max(half, born);
+      float reach = std::max(0.5F * cell, born);
       for (std::uint32_t r = 0; r < patch.ring_size; ++r)
         reach = std::max(reach, direction.dot(scene_.rest_position[patch.ring[r]] - patch.center));
       if (distance > reach) {
@@ -265,21 +283,23 @@ class Relaxation {
 
   const RelaxationScene& scene_;
   Births& births_;
+  RelaxationMemory& memory_;
   const std::vector<float> born_x_, born_y_;
-  std::vector<std::uint32_t> split_of_;  // by sample
-  Evaluated now_;
-  std::vector<std::uint32_t> count_;  // by child
-  std::vector<float> radius_;
-  std::vector<std::uint32_t> neighbors_;
-  Points moved_;
+  std::vector<FamilyRing> rings_;  // by split
+  // By child.
+  Points along_x_, along_y_;  // U: J of the patch's tangents
+  std::vector<float> radius_, list_radius_;
+  std::vector<std::uint32_t> count_;
+  std::vector<std::uint32_t> list_;
+  Points aside_, push_;
 };
 
 }  // namespace
 
-void relax(const RelaxationScene& scene, std::uint32_t sweeps, Births& births,
+void relax(const RelaxationScene& scene, std::uint32_t sweeps, Births& births, RelaxationMemory& memory,
            const ExecutionContext* context) {
   if (births.x.empty() || sweeps == 0) return;
-  Relaxation(scene, births).run(sweeps, context);
+  Relaxation(scene, births, memory).run(sweeps, context);
 }
 
 }  // namespace pointwright

@@ -21,22 +21,30 @@ struct RelaxationScene {
   const Splits& splits;
   const RestPatches& patches;
   const Sampling& sampling;
-  const Cells& rest;            ///< cells of the samples that were there before
-  const Points& rest_position;  ///< on the edited level
-  const Points& deformed;       ///< F of them: they stay
+  const Cells& rest;                         ///< cells of the samples that were there before
+  const Points& rest_position;               ///< of these, on the edited level
+  const Points& deformed;                    ///< F of them: they stay
+  const std::vector<std::uint32_t>& blocks;  ///< those of kSimdBlock samples that F may have moved
   const ResamplingParams& params;
   float coarser;  ///< of wanted_spacing()
+};
+
+/// Memory that the frames of a drag hand on. Of one surface and its blocks.
+struct RelaxationMemory {
+  Points places;                        ///< of the samples that were there before, then of children
+  std::vector<std::uint32_t> split_of;  ///< by sample: its split, or none
 };
 
 /// Moves children apart: Jacobi sweeps of repulsion among the families of each child's parent and of its
 /// neighbours at rest, so neighbourhoods are never searched for in space and sheets that touch never mix. A
 /// displacement is taken back to rest space by (U^T U)^-1 U^T, U = J E; F and U are evaluated anew every four
-/// sweeps. Nobody goes farther than half a cell from where it was born, or over the border of the surface.
+/// sweeps. Nobody goes farther than two thirds of a cell from where it was born, or over the border of the
+/// surface.
 /// Paper:       §5.2; in rest space (engine/README.md says why)
-/// Cost:        O(C) a sweep, parallel
+/// Cost:        O(C) a sweep, vectorised, parallel
 /// Determinism: bitwise equal for any thread count and instruction set
 /// Cancels:     between sweeps; positions are then valid but not relaxed
-void relax(const RelaxationScene& scene, std::uint32_t sweeps, Births& births,
+void relax(const RelaxationScene& scene, std::uint32_t sweeps, Births& births, RelaxationMemory& memory,
            const ExecutionContext* context = nullptr);
 
 }  // namespace pointwright

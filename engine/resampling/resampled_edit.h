@@ -15,8 +15,10 @@ namespace pointwright {
 
 /// How much may be spent on one.
 enum class ResamplingEffort {
-  kExact,    ///< what is recorded
-  kPreview,  ///< of a drag's frame: fewer sweeps of relaxation, nothing is collected
+  kExact,  ///< what is recorded
+  /// Of a drag's frame: fewer sweeps of relaxation, at most 100,000 samples inserted, wider apart where it
+  /// would be more; nothing is collected, and the sampling's graph stays that of the samples before.
+  kPreview,
 };
 
 /// The surface after an edit, and its samples: those before the edit first, in their order, then the inserted

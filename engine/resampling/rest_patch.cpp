@@ -6,6 +6,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/multires/shape_operator.h"
+#include "engine/resampling/nearest_few.h"
 
 namespace pointwright {
 namespace {
@@ -15,25 +16,15 @@ constexpr std::uint32_t kMissing = std::numeric_limits<std::uint32_t>::max();
 // Below this the least pivot of the scaled normal equations says that the neighbours determine no jet.
 constexpr double kLeastPivot = 1e-6;
 constexpr std::size_t kPatchesOfRange = 128;
-constexpr std::size_t kMostCandidates = 32 * 33;
-
-struct Candidate {
-  float distance = 0.0F;  // squared
-  std::uint32_t sample = 0;
-  friend bool operator<(const Candidate& a, const Candidate& b) {
-    return a.distance < b.distance || (a.distance == b.distance && a.sample < b.sample);
-  }
-};
 
 // The neighbours of sample i and their neighbours, on its side, the nearest kRingSize of them.
 void set_ring(const Level& level, const NeighborGraph& graph, std::uint32_t i, RestPatch& patch) {
-  std::array<Candidate, kMostCandidates> found;
-  std::size_t count = 0;
+  NearestFew<kRingSize> nearest(kRingSize);
   const auto consider = [&](std::uint32_t j) {
     const float distance = (level.position[j] - patch.center).squaredNorm();
     // Exact duplicates say nothing, and opposed normals are another sheet.
     if (j == i || !(distance > 0.0F) || level.normal[j].dot(patch.normal) <= 0.0F) return;
-    found[count++] = {.distance = distance, .sample = j};
+    nearest.consider(distance, j);
   };
   for (std::uint32_t a = 0; a < graph.k; ++a) consider(graph.index(i, a));
   if (graph.k < kRingSize) {
@@ -42,11 +33,8 @@ void set_ring(const Level& level, const NeighborGraph& graph, std::uint32_t i, R
       for (std::uint32_t b = 0; b < graph.k; ++b) consider(graph.index(near, b));
     }
   }
-  std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count));
-  for (std::size_t c = 0; c < count && patch.ring_size < kRingSize; ++c) {
-    if (patch.ring_size > 0 && patch.ring[patch.ring_size - 1] == found[c].sample) continue;
-    patch.ring[patch.ring_size++] = found[c].sample;
-  }
+  patch.ring_size = nearest.count();
+  for (std::uint32_t r = 0; r < nearest.count(); ++r) patch.ring[r] = nearest[r];
 }
 
 void fit_jet(const Level& level, RestPatch& patch) {

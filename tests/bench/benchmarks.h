@@ -13,6 +13,7 @@ void bench_editing(BenchReport& report);
 void bench_frames(BenchReport& report);
 void bench_session(BenchReport& report);
 void bench_undo(BenchReport& report);
+void bench_resampling(BenchReport& report);
 /// Only where the daemon is built.
 void bench_http(BenchReport& report);
 

@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
     pointwright::bench::bench_multires(report);
     pointwright::bench::bench_editing(report);
     pointwright::bench::bench_frames(report);
+    pointwright::bench::bench_resampling(report);
     pointwright::bench::bench_session(report);
     pointwright::bench::bench_undo(report);
 #ifdef POINTWRIGHT_BENCH_HTTP
