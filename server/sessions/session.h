@@ -71,7 +71,6 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<Committed> commit(const EditParams& params, Expected expected);
   /// Undo, redo, jump: keeps the first `edit` edits applied.
   Outcome<SharedDocument> move_head(std::size_t edit, Expected expected = {});
-
   /// The history as it stands, to go on from beside the session, and the document that it belongs to.
   struct Fork {
     SharedDocument document;
@@ -115,7 +114,6 @@ class Session : public std::enable_shared_from_this<Session> {
     Blend blend = Blend::kQuartic;
     friend bool operator==(const FieldKey&, const FieldKey&) = default;
   };
-
   Session(SessionParams params, SessionServices services);
   // Everything below runs on the strand, except where it says otherwise.
   void build();  // on the background pool
