@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
@@ -12,6 +13,9 @@ namespace {
 
 constexpr std::size_t kBlocksOfRange = kParallelBlock / kSimdBlock;
 constexpr float kGreatestAnisotropy = 1e6F;
+// Sides whose fourth powers a float holds.
+constexpr float kTiny = 1e-8F;
+constexpr float kHuge = 1e8F;
 
 // `side` without its part along the normal, as long as it was; nothing where it stands upright.
 Vec3f turned_into_plane(const Vec3f& side, const Vec3f& normal) {
@@ -28,20 +32,25 @@ Cells cells_on_level(const Sampling& sampling, const Points& normal,
   POINTWRIGHT_CHECK(sampling.size() == n, "normals of the sampling's samples");
   const bool carried = !sampling.cell_u.empty();
   Cells cells{.u = carried ? sampling.cell_u : Points(n), .v = carried ? sampling.cell_v : Points(n)};
+  if (!carried) {
+    // All of them: the next edit may move samples that this one does not.
+    parallel_for(n, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const TangentFrame frame = tangent_frame(normal[i].cast<double>());
+        cells.u.set(i, frame.u.cast<float>());
+        cells.v.set(i, frame.v.cast<float>());
+      }
+    });
+    return cells;
+  }
   parallel_for(
       blocks.size(),
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t entry = begin; entry < end; ++entry) {
           const std::size_t first = std::size_t{blocks[entry]} * kSimdBlock;
           for (std::size_t i = first; i < std::min(first + kSimdBlock, n); ++i) {
-            if (carried) {
-              cells.u.set(i, turned_into_plane(cells.u[i], normal[i]));
-              cells.v.set(i, turned_into_plane(cells.v[i], normal[i]));
-            } else {
-              const TangentFrame frame = tangent_frame(normal[i].cast<double>());
-              cells.u.set(i, frame.u.cast<float>());
-              cells.v.set(i, frame.v.cast<float>());
-            }
+            cells.u.set(i, turned_into_plane(cells.u[i], normal[i]));
+            cells.v.set(i, turned_into_plane(cells.v[i], normal[i]));
           }
         }
       },
@@ -66,6 +75,13 @@ MappedCells map_cells(const DeformMap& map, const std::vector<std::uint32_t>& bl
 }
 
 PrincipalStretch principal_stretch(const Vec3f& u, const Vec3f& v) {
+  const float size = std::max(u.cwiseAbs().maxCoeff(), v.cwiseAbs().maxCoeff());
+  if (size > 0.0F && !(size > kTiny && size < kHuge)) {
+    PrincipalStretch scaled = principal_stretch(u / size, v / size);
+    scaled.major *= size;
+    scaled.minor *= size;
+    return scaled;
+  }
   const float uu = u.squaredNorm();
   const float uv = u.dot(v);
   const float vv = v.squaredNorm();
@@ -98,7 +114,7 @@ StretchColumns stretch_columns(const Sampling& sampling) {
       const PrincipalStretch stretch = principal_stretch(sampling.cell_u[i], sampling.cell_v[i]);
       columns.major[i] = stretch.major;
       columns.minor[i] = stretch.minor;
-      columns.area[i] = stretch.major * stretch.minor;
+      columns.area[i] = std::min(stretch.major * stretch.minor, std::numeric_limits<float>::max());
       columns.anisotropy[i] = stretch.minor * kGreatestAnisotropy > stretch.major
                                   ? stretch.major / stretch.minor
                                   : kGreatestAnisotropy;

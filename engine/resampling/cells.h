@@ -18,8 +18,8 @@ struct Cells {
 };
 
 /// The cells that the sampling carries, each side turned into the tangent plane of the level's normal with
-/// its length kept; unit squares in the tangent frames where it carries none. Samples of `blocks` alone, the
-/// others as they are carried, or 0.
+/// its length kept, of the samples of `blocks` alone; unit squares in the tangent frames of all samples where
+/// it carries none.
 /// Cost: O(N), parallel
 Cells cells_on_level(const Sampling& sampling, const Points& normal,
                      const std::vector<std::uint32_t>& blocks);
@@ -52,7 +52,7 @@ struct StretchColumns {
   std::vector<float> major;       ///< larger principal stretch
   std::vector<float> minor;       ///< smaller one
   std::vector<float> anisotropy;  ///< major / minor, at most 1e6
-  std::vector<float> area;        ///< major * minor: how many times the area has grown
+  std::vector<float> area;        ///< major * minor, finite: how many times the area has grown
 };
 /// Cost: O(N), parallel.
 StretchColumns stretch_columns(const Sampling& sampling);

@@ -56,6 +56,7 @@ Result<ResampledEdit> apply_resampled_edit(const MultiresSurface& surface,
   POINTWRIGHT_CHECK(params.resampling.has_value(), "parameters of resampling");
   POINTWRIGHT_CHECK(sampling->size() == before && field.size() == before,
                     "a sampling and a field of the surface");
+  if (before == 0) return ResampledEdit{.surface = surface, .sampling = sampling};
   const ResamplingParams& wanted = *params.resampling;
   const bool preview = effort == ResamplingEffort::kPreview;
   const Level& level = surface.levels[params.level];
