@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
@@ -118,7 +119,7 @@ StretchColumns stretch_columns(const Sampling& sampling) {
       const PrincipalStretch stretch = principal_stretch(sampling.cell_u[i], sampling.cell_v[i]);
       columns.major[i] = stretch.major;
       columns.minor[i] = stretch.minor;
-      columns.area[i] = stretch.major * stretch.minor;
+      columns.area[i] = std::min(stretch.major * stretch.minor, std::numeric_limits<float>::max());
       columns.anisotropy[i] = stretch.minor * kGreatestAnisotropy > stretch.major
                                   ? stretch.major / stretch.minor
                                   : kGreatestAnisotropy;

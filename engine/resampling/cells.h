@@ -54,7 +54,7 @@ struct StretchColumns {
   std::vector<float> major;       ///< larger principal stretch
   std::vector<float> minor;       ///< smaller one
   std::vector<float> anisotropy;  ///< major / minor, at most 1e6
-  std::vector<float> area;        ///< major * minor: how many times the area has grown
+  std::vector<float> area;        ///< major * minor, finite: times the area has grown
 };
 /// Cost: O(N), parallel.
 StretchColumns stretch_columns(const Sampling& sampling);

@@ -7,6 +7,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/resampling/cells.h"
+#include "engine/spatial/kd_tree.h"
 
 namespace pointwright {
 namespace {
@@ -17,6 +18,7 @@ constexpr std::uint32_t kNearest = 6;    // among them the nearest on the same s
 constexpr std::size_t kMostRounds = 64;  // each halves the worst places; ten do for a squeeze by a thousand
 constexpr float kMostGrowth = 4.0F;      // of a cell that takes another one over
 constexpr std::size_t kMostVisited = 256;
+constexpr std::size_t kCopies = 8;  // of a sample that a search may find before its neighbours
 
 // Samples of an edited surface that may go, and those around them.
 class Collection {
@@ -39,8 +41,9 @@ class Collection {
       if (near[i] != 0) members_.push_back(static_cast<std::uint32_t>(i));
   }
 
-  // Removes one round of pairs. Returns whether there was one.
-  bool round() {
+  // Removes one round of pairs, of inserted samples alone or of any. Returns whether there was one.
+  bool round(bool inserted_alone) {
+    inserted_alone_ = inserted_alone;
     std::erase_if(members_, [this](std::uint32_t i) { return gone_[i] != 0; });
     if (members_.size() < 2) return false;
     const std::vector<std::uint32_t> nearest = nearest_of_members();
@@ -82,6 +85,7 @@ class Collection {
                                         std::size_t m) const {
     const Points& normal = surface_.finest().normal;
     const auto faces = [&](std::size_t other) {
+      if (inserted_alone_ && !inserted(members_[m]) && !inserted(members_[other])) return false;
       return normal[members_[m]].dot(normal[members_[other]]) > 0.0F;
     };
     // Graphs list no exact copies; where these stand one after the other they are the nearest of all.
@@ -96,35 +100,45 @@ class Collection {
   }
 
   bool remove_one(std::uint32_t a, std::uint32_t b) {
-    const Vec3f way = place(b) - place(a);
-    if (!(way.norm() < closest_ * std::min(sampling_.spacing[a], sampling_.spacing[b]))) return false;
-    if (may_go_[a] == 0 && may_go_[b] == 0) return false;
-    const bool a_goes = may_go_[b] == 0 || (may_go_[a] != 0 && goes_before(a, b));
+    if (!((place(b) - place(a)).norm() < closest_ * std::min(sampling_.spacing[a], sampling_.spacing[b])))
+      return false;
+    const bool a_may = may_go(a);
+    const bool b_may = may_go(b);
+    if (!a_may && !b_may) return false;
+    const bool a_goes = !b_may || (a_may && goes_before(a, b));
     const std::uint32_t goes = a_goes ? a : b;
     gone_[goes] = 1;
-    take_over(a_goes ? b : a, goes, way);
+    take_over(a_goes ? b : a, goes);
     return true;
   }
 
+  [[nodiscard]] bool inserted(std::uint32_t i) const {
+    return !sampling_.parent.empty() && sampling_.parent[i] != kNoParent;
+  }
+  [[nodiscard]] bool may_go(std::uint32_t i) const {
+    if (may_go_[i] == 0) return false;
+    // Who has taken over enough cells is squeezed no more: a pair that noise has brought together stays.
+    return inserted_alone_ ? inserted(i) : area(i) < kSqueezedArea;
+  }
   [[nodiscard]] bool goes_before(std::uint32_t a, std::uint32_t b) const {
-    const auto inserted = [this](std::uint32_t i) {
-      return !sampling_.parent.empty() && sampling_.parent[i] != kNoParent;
-    };
     if (inserted(a) != inserted(b)) return inserted(a);
     return sampling_.cloud->id[a] > sampling_.cloud->id[b];
   }
 
-  // The cell of who stays grows along the way between the two.
-  void take_over(std::uint32_t stays, std::uint32_t goes, const Vec3f& way) {
-    const float own = area(stays);
-    const float length = way.norm();
-    if (!(own > 0.0F) || !(length > 0.0F)) return;
-    const float growth = std::min(1.0F + area(goes) / own, kMostGrowth) - 1.0F;
-    const Vec3f direction = way / length;
-    for (Points* sides : {&cells_.u, &cells_.v}) {
-      const Vec3f side = (*sides)[stays];
-      sides->set(stays, side + growth * side.dot(direction) * direction);
-    }
+  // The cell of who stays grows by that of who goes: across, up to a square, then every way. Squeezed pairs
+  // lie along the shorter axis; cells longer than they must be would split again in the next edit.
+  void take_over(std::uint32_t stays, std::uint32_t goes) {
+    const Vec3f u = cells_.u[stays];
+    const Vec3f v = cells_.v[stays];
+    const PrincipalStretch own = principal_stretch(u, v);
+    const float before = own.major * own.minor;
+    if (!(before > 0.0F)) return;
+    const float after = std::min(before + area(goes), kMostGrowth * before);
+    const float major = std::max(own.major, std::sqrt(after));
+    const Vec3f along = own.cosine * u + own.sine * v;
+    const Vec3f across = own.cosine * v - own.sine * u;
+    cells_.u.set(stays, major / own.major * along);
+    cells_.v.set(stays, after / (major * own.minor) * across);
   }
 
   const MultiresSurface& surface_;
@@ -134,34 +148,57 @@ class Collection {
   std::vector<std::uint8_t> may_go_;
   std::vector<std::uint8_t> gone_;
   std::vector<std::uint32_t> members_;  // ascending
+  bool inserted_alone_ = false;
 };
 
-// The row of sample i without who is gone: its neighbours, and where these are too few, theirs.
-void fill_row(const NeighborGraph& graph, const std::vector<std::uint8_t>& gone, const Points& position,
+Points gathered(const Points& column, const std::vector<std::uint32_t>& order) {
+  Points result(order.size());
+  for (std::size_t m = 0; m < order.size(); ++m) result.set(m, column[order[m]]);
+  return result;
+}
+
+// The row of sample i without who is gone: its neighbours, and where these are too few, theirs. False where
+// too few are left nearby to say who is nearest.
+bool fill_row(const NeighborGraph& graph, const std::vector<std::uint8_t>& gone, const Points& position,
               std::uint32_t i, std::vector<std::uint32_t>& row) {
-  struct Near {
-    float distance;
-    std::uint32_t sample;
-  };
   std::vector<std::uint32_t> visited{i};
-  std::vector<Near> alive;
+  std::vector<Neighbor> alive;
+  const std::size_t enough = 2 * std::size_t{graph.k};
   for (std::size_t next = 0; next < visited.size(); ++next) {
     // Whole rings only, and one beyond what would be enough: the nearest may be a ring farther out.
-    if (alive.size() >= 2 * std::size_t{graph.k} || visited.size() >= kMostVisited) break;
+    if (alive.size() >= enough || visited.size() >= kMostVisited) break;
     for (std::uint32_t j = 0; j < graph.k; ++j) {
       const std::uint32_t other = graph.index(visited[next], j);
       if (std::find(visited.begin(), visited.end(), other) != visited.end()) continue;
       visited.push_back(other);
       const float distance = (position[other] - position[i]).squaredNorm();
-      if (gone[other] == 0 && distance > 0.0F) alive.push_back({distance, other});
+      if (gone[other] == 0 && distance > 0.0F) alive.push_back({.index = other, .distance_sq = distance});
     }
   }
-  std::sort(alive.begin(), alive.end(), [](const Near& a, const Near& b) {
-    return a.distance < b.distance || (a.distance == b.distance && a.sample < b.sample);
-  });
+  std::sort(alive.begin(), alive.end());
   row.clear();
-  for (std::uint32_t j = 0; j < graph.k && !alive.empty(); ++j)
-    row.push_back(alive[std::min<std::size_t>(j, alive.size() - 1)].sample);
+  for (std::size_t j = 0; j < std::min<std::size_t>(graph.k, alive.size()); ++j)
+    row.push_back(alive[j].index);
+  return alive.size() >= enough;
+}
+
+// Rows of survivors found among all of them, by their new numbers.
+void search_rows(const std::vector<std::uint32_t>& rows, const Points& position, NeighborGraph& graph) {
+  if (rows.empty() || graph.k == 0) return;
+  const KdTree tree(position);
+  parallel_for(rows.size(), [&](std::size_t begin, std::size_t end) {
+    std::vector<Neighbor> found;
+    for (std::size_t r = begin; r < end; ++r) {
+      const std::uint32_t m = rows[r];
+      tree.nearest(position[m], graph.k + kCopies, found);
+      // Neither itself nor, where there are others, a copy of it.
+      std::erase_if(found, [m](const Neighbor& near) { return near.index == m; });
+      if (found.back().distance_sq > 0.0F)
+        std::erase_if(found, [](const Neighbor& near) { return !(near.distance_sq > 0.0F); });
+      for (std::uint32_t j = 0; j < graph.k; ++j)
+        graph.index(m, j) = found[std::min<std::size_t>(j, found.size() - 1)].index;
+    }
+  });
 }
 
 NeighborGraph survivors_graph(const NeighborGraph& graph, const std::vector<std::uint8_t>& gone,
@@ -169,7 +206,9 @@ NeighborGraph survivors_graph(const NeighborGraph& graph, const std::vector<std:
   std::vector<std::uint32_t> number(gone.size(), 0);
   for (std::size_t m = 0; m < order.size(); ++m) number[order[m]] = static_cast<std::uint32_t>(m);
   NeighborGraph left{.count = order.size(), .k = graph.k, .lanes = {}, .duplicate_count = 0};
+  left.k = static_cast<std::uint32_t>(std::min<std::size_t>(graph.k, order.size() - 1));
   left.lanes.resize(padded_to_block(left.count) * left.k, 0);
+  std::vector<std::uint8_t> searched(order.size(), 0);
   parallel_for(order.size(), [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> row;
     for (std::size_t m = begin; m < end; ++m) {
@@ -179,11 +218,17 @@ NeighborGraph survivors_graph(const NeighborGraph& graph, const std::vector<std:
         row.push_back(graph.index(order[m], j));
         whole = whole && gone[row.back()] == 0;
       }
-      if (!whole) fill_row(graph, gone, position, order[m], row);
-      for (std::uint32_t j = 0; j < graph.k; ++j)
-        left.index(m, j) = row.empty() ? static_cast<std::uint32_t>(m) : number[row[j]];
+      if (!whole && !fill_row(graph, gone, position, order[m], row)) {
+        searched[m] = 1;
+        continue;
+      }
+      for (std::uint32_t j = 0; j < left.k; ++j) left.index(m, j) = number[row[j]];
     }
   });
+  std::vector<std::uint32_t> rows;
+  for (std::size_t m = 0; m < searched.size(); ++m)
+    if (searched[m] != 0) rows.push_back(static_cast<std::uint32_t>(m));
+  search_rows(rows, gathered(position, order), left);
   return left;
 }
 
@@ -196,18 +241,15 @@ std::vector<T> gathered(const std::vector<T>& column, const std::vector<std::uin
   return result;
 }
 
-Points gathered(const Points& column, const std::vector<std::uint32_t>& order) {
-  Points result(order.size());
-  for (std::size_t m = 0; m < order.size(); ++m) result.set(m, column[order[m]]);
-  return result;
-}
-
 }  // namespace
 
 void collect(const ScaleField& field, float closest, ResampledEdit& result) {
   const Sampling& sampling = *result.sampling;
   Collection collection(result.surface, sampling, field, closest);
-  for (std::size_t round = 0; round < kMostRounds && collection.round(); ++round) {
+  // Inserted samples first, all that stand too close to anybody: originals take their cells back.
+  for (const bool inserted_alone : {true, false}) {
+    for (std::size_t round = 0; round < kMostRounds && collection.round(inserted_alone); ++round) {
+    }
   }
   const std::vector<std::uint32_t> order = collection.survivors();
   result.removed = sampling.size() - order.size();

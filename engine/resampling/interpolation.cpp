@@ -52,22 +52,55 @@ bool fit(const std::array<Offset, kZombies>& offsets, ZombieWeights& result) {
   return true;
 }
 
+// How far apart in texture; what is no number is infinitely far from everything.
+float texture_distance(const TexCoord& a, const TexCoord& b) {
+  const float distance = std::max(std::abs(a[0] - b[0]), std::abs(a[1] - b[1]));
+  return distance >= 0.0F && std::isfinite(a[1] - b[1]) ? distance : std::numeric_limits<float>::infinity();
+}
+
+// Which samples hang together with the nearest one in texture, by steps of at most `limit`.
+std::array<bool, kZombies> linked(const ZombieWeights& all, const std::vector<TexCoord>& texcoord,
+                                  float limit) {
+  std::array<bool, kZombies> found{};
+  std::array<std::uint32_t, kZombies> queue{};
+  std::uint32_t count = 1;
+  found[0] = true;
+  for (std::uint32_t next = 0; next < count; ++next) {
+    const TexCoord& from = texcoord[all.sample[queue[next]]];
+    for (std::uint32_t j = 0; j < all.count; ++j) {
+      if (found[j] || !(texture_distance(from, texcoord[all.sample[j]]) <= limit)) continue;
+      found[j] = true;
+      queue[count++] = j;
+    }
+  }
+  return found;
+}
+
 // The samples whose texture coordinates do not lie across a seam from the nearest's, with weights of sum 1.
 ZombieWeights without_seam(const ZombieWeights& all, const std::vector<TexCoord>& texcoord) {
-  std::array<float, kZombies> away{};
-  const TexCoord& nearest = texcoord[all.sample[0]];
-  for (std::uint32_t j = 0; j < all.count; ++j) {
-    const TexCoord& other = texcoord[all.sample[j]];
-    const float distance = std::max(std::abs(other[0] - nearest[0]), std::abs(other[1] - nearest[1]));
-    away[j] = distance >= 0.0F ? distance : std::numeric_limits<float>::infinity();  // NaN is far away
+  // Two of those that follow each other lie on the same side: where nobody is far away compared to the
+  // closest such pair, there is no seam.
+  float closest = std::numeric_limits<float>::infinity();
+  float farthest = 0.0F;
+  for (std::uint32_t j = 1; j < all.count; ++j) {
+    const TexCoord& here = texcoord[all.sample[j]];
+    closest = std::min(closest, texture_distance(here, texcoord[all.sample[j - 1]]));
+    farthest = std::max(farthest, texture_distance(here, texcoord[all.sample[0]]));
   }
-  std::array<float, kZombies> sorted = away;
-  const auto middle = sorted.begin() + all.count / 2;
-  std::nth_element(sorted.begin(), middle, sorted.begin() + all.count);
-  const float limit = kSeam * *middle;
+  if (farthest <= kSeam * closest && std::isfinite(farthest)) return all;
+  std::array<float, kZombies> nearest{};  // in texture, by sample
+  nearest.fill(std::numeric_limits<float>::infinity());
+  for (std::uint32_t a = 0; a < all.count; ++a) {
+    for (std::uint32_t b = 0; b < all.count; ++b)
+      if (a != b)
+        nearest[a] = std::min(nearest[a], texture_distance(texcoord[all.sample[a]], texcoord[all.sample[b]]));
+  }
+  const auto middle = nearest.begin() + all.count / 2;
+  std::nth_element(nearest.begin(), middle, nearest.begin() + all.count);
+  const std::array<bool, kZombies> same_side = linked(all, texcoord, kSeam * *middle);
   ZombieWeights kept;
   for (std::uint32_t j = 0; j < all.count; ++j) {
-    if (!(away[j] <= limit)) continue;
+    if (!same_side[j]) continue;
     kept.sample[kept.count] = all.sample[j];
     kept.weight[kept.count++] = all.weight[j];
   }

@@ -35,8 +35,9 @@ std::vector<ZombieWeights> all_zombie_weights(const Splits& splits, const RestPa
 
 /// Appends the children's entries to the cloud's colours, texture coordinates and further attributes. Colours
 /// and floating-point attributes stay within the range of the samples that they come from; whole numbers, and
-/// what is NaN somewhere among them, are the nearest sample's. Texture coordinates do not mix over a seam: a
-/// sample counts that lies no farther from the nearest in texture than ten times the median.
+/// what is NaN somewhere among them, are the nearest sample's. Texture coordinates do not mix over a seam:
+/// those samples count that hang together with the nearest one in texture, by steps of ten times the median
+/// distance between next neighbours.
 /// Cost: O(C) a column, parallel
 void append_attributes(const std::vector<ZombieWeights>& weights, Cloud& cloud);
 

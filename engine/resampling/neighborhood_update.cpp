@@ -45,7 +45,7 @@ class Update {
       for (std::uint32_t c = first; c < first + split.children(); ++c) consider(c);
     };
     consider_family(old);
-    if (split_of_[old] != kNone) {
+    if (split_of_[old] != kNone && before_.k <= kRingSize) {
       const RestPatch& patch = inserted_.patches.of(old);
       for (std::uint32_t r = 0; r < patch.ring_size; ++r) consider_family(patch.ring[r]);
     } else {

@@ -1,149 +1,172 @@
-// Resampling of samples and deformations that leave little to compute with.
+// Input that is legal and awkward: results are finite, with unit normals.
 #include <doctest/doctest.h>
 
-#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
-#include "engine/resampling/cells.h"
-#include "engine/resampling/resampled_edit.h"
-#include "tests/support/pulled_plane.h"
+#include "tests/resampling/resampling_support.h"
 
 namespace pointwright {
 namespace {
 
-/// Any samples between a zero-region at the origin and a one-region at (1, 0, 0).
-test::PulledPlane scene_of(const test::Surface& samples, const Deformation& deformation) {
-  test::PulledPlane scene;
-  const std::size_t n = samples.size();
-  scene.surface.levels.push_back({.position = samples.position, .normal = samples.normal});
-  scene.regions = {.zero = Region(test::from_list({Vec3f::Zero()}), {0.05F}),
-                   .one = Region(test::from_list({Vec3f::UnitX()}), {0.05F})};
-  scene.params = {.deformation = deformation, .resampling = ResamplingParams{.collect = 0.9}};
-  scene.field = compute_scale_field(samples.position, scene.regions, scene.params.blend);
-  scene.sampling = std::make_shared<const Sampling>(
-      rest_sampling(std::make_shared<const Cloud>(test::to_cloud(samples)),
-                    std::make_shared<const NeighborGraph>(build_neighbor_graph(samples.position, 10)),
-                    std::vector<float>(n, 0.1F)));
-  return scene;
+Level level_from(const Points& position) {
+  Level level{.position = position, .normal = Points(position.size())};
+  for (std::size_t i = 0; i < position.size(); ++i) level.normal.set(i, Vec3f::UnitZ());
+  return level;
+}
+Region ball(const Vec3f& center, float radius) {
+  return Region(test::from_list({center}), {radius});
+}
+RegionPair everything() {
+  return {.zero = ball({1e6F, 0.0F, 0.0F}, 1.0F), .one = ball(Vec3f::Zero(), 1e5F)};
+}
+RegionPair left_and_right(float gap) {
+  return {.zero = ball({-1e4F - gap, 0.0F, 0.0F}, 1e4F), .one = ball({1e4F + gap, 0.0F, 0.0F}, 1e4F)};
 }
 
-test::Surface facing_up(const Points& position) {
-  test::Surface samples{.position = position, .normal = Points(position.size())};
-  for (std::size_t i = 0; i < position.size(); ++i) samples.normal.set(i, Vec3f::UnitZ());
-  return samples;
+std::vector<Deformation> awkward_deformations() {
+  return {Translation{},
+          Translation{.vector = Vec3d(0.0, 0.0, 10.0)},
+          Translation{.vector = Vec3d(-3.0, 0.0, 0.0)},
+          Scaling{.factors = Vec3d(5.0, 0.001, 1.0)},
+          Scaling{.factors = Vec3d::Constant(0.001)},
+          Rotation{.axis = Vec3d::UnitX(), .angle_rad = 20.0},
+          NormalOffset{.distance = 2.0},
+          TowardPoint{.target = Vec3d(0.5, 0.5, 0.5), .amount = 1.0}};
 }
 
-ResampledEdit resampled(const test::PulledPlane& scene) {
-  auto result = apply_resampled_edit(scene.surface, scene.sampling, scene.params, scene.field, scene.regions,
-                                     ResamplingEffort::kExact);
-  REQUIRE(result.ok());
-  return std::move(result).value();
-}
-
-/// Columns of one size without a hole, ids and neighbours that exist.
-void check_whole(const ResampledEdit& edit, std::size_t before) {
-  const Sampling& sampling = *edit.sampling;
-  const std::size_t n = before + edit.inserted - edit.removed;
-  REQUIRE(sampling.size() == n);
-  REQUIRE(edit.surface.sample_count() == n);
-  REQUIRE(sampling.cloud->size() == n);
-  REQUIRE(sampling.graph->count == n);
-  CHECK((sampling.parent.empty() || sampling.parent.size() == n));
-  CHECK(sampling.cell_u.size() == n);
-  CHECK(sampling.cell_v.size() == n);
-  for (const Level& level : edit.surface.levels) {
-    REQUIRE(level.position.size() == n);
-    CHECK(test::all_finite(level.position));
-    CHECK(test::all_finite(level.normal));
-  }
-  CHECK(test::all_finite(sampling.cell_u));
-  CHECK(test::all_finite(sampling.cell_v));
-  std::vector<std::uint32_t> ids(sampling.cloud->id.begin(), sampling.cloud->id.end());
-  std::sort(ids.begin(), ids.end());
-  CHECK(std::adjacent_find(ids.begin(), ids.end()) == ids.end());
-  CHECK((ids.empty() || ids.back() < sampling.next_id));
-  std::size_t beyond = 0;
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::uint32_t j = 0; j < sampling.graph->k; ++j)
-      beyond += static_cast<std::size_t>(sampling.graph->index(i, j) >= n);
-  CHECK(beyond == 0);
-}
-
-TEST_CASE("stretches of any size have principal axes") {
-  for (const float size : {1e-30F, 1e-12F, 1e-6F, 1.0F, 1e6F, 1e12F, 1e30F}) {
-    CAPTURE(size);
-    const PrincipalStretch stretch =
-        principal_stretch({3.0F * size, 4.0F * size, 0.0F}, {0.0F, 0.0F, 2.0F * size});
-    CHECK(stretch.major / size == doctest::Approx(5.0F).epsilon(1e-6));
-    CHECK(stretch.minor / size == doctest::Approx(2.0F).epsilon(1e-6));
-    CHECK(stretch.cosine == 1.0F);
-    CHECK(stretch.sine == 0.0F);
-  }
-  const PrincipalStretch nothing = principal_stretch(Vec3f::Zero(), Vec3f::Zero());
-  CHECK(nothing.major == 0.0F);
-  CHECK(nothing.minor == 0.0F);
-  CHECK(nothing.cosine == 1.0F);
-}
-
-TEST_CASE("the farthest pull that an edit may ask for splits each sample into as many as may be") {
-  test::PulledPlane scene = test::pulled_plane(12);
-  scene.params.deformation = Translation{.vector = Vec3d(0.0, 0.0, kMaxDeformationLength)};
-  const std::size_t before = scene.sampling->size();
-  const ResampledEdit edit = resampled(scene);
-  check_whole(edit, before);
-  const auto stretched = static_cast<std::size_t>(std::count_if(
-      scene.field.t.begin(), scene.field.t.end(), [](float t) { return t > 0.0F && t < 1.0F; }));
-  REQUIRE(stretched > 40);
-  CHECK(edit.inserted >= 60 * stretched);
-  const Points& p = edit.surface.finest().position;
-  Points rest(p.size());
-  for (std::size_t i = 0; i < p.size(); ++i) rest.set(i, {p[i].x(), p[i].y(), 0.0F});
-  const ScaleField field = compute_scale_field(rest, scene.regions, scene.params.blend);
-  std::size_t off = 0;
-  for (std::size_t i = 0; i < p.size(); ++i)
-    off += static_cast<std::size_t>(p[i].z() != field.t[i] * static_cast<float>(kMaxDeformationLength));
-  CHECK(off == 0);
-}
-
-TEST_CASE("a few samples, and samples at one place or on a line, are resampled or left as they are") {
-  const Vec3f middle(0.5F, 0.0F, 0.0F);
-  for (const Deformation& deformation :
-       {Deformation(Translation{.vector = Vec3d(5.0, 0.0, 1.0)}), Deformation(NormalOffset{.distance = 5.0}),
-        Deformation(Scaling{.center = Vec3d::Zero(), .factors = Vec3d::Constant(1e-3)}),
-        Deformation(Scaling{.center = Vec3d::Zero(), .factors = Vec3d(1e-3, 4.0, 1e-3)})}) {
-    CHECK(resampled(scene_of(facing_up(Points(0)), deformation)).sampling->size() == 0);
-    const auto alone = resampled(scene_of(facing_up(test::identical(1, middle)), deformation));
-    check_whole(alone, 1);
-    CHECK(alone.inserted + alone.removed == 0);  // no neighbours, no cell
-    const auto copies = resampled(scene_of(facing_up(test::identical(40, middle)), deformation));
-    check_whole(copies, 40);
-    CHECK(copies.inserted == 0);
-    for (const std::size_t count : {2UL, 3UL, 60UL}) {
-      CAPTURE(count);
-      const auto line = facing_up(test::collinear(count, {0.1F, 0.0F, 0.0F}, {0.9F, 0.0F, 0.0F}));
-      check_whole(resampled(scene_of(line, deformation)), count);
-    }
+// The edit, its preview, and the same again after it.
+void check_all(const Level& level, const RegionPair& regions, const std::vector<Deformation>& deformations,
+               const ResamplingParams& resampling = {.collect = 0.7}) {
+  for (std::size_t d = 0; d < deformations.size(); ++d) {
+    CAPTURE(d);
+    CAPTURE(level.position.size());
+    const MultiresSurface surface =
+        test::one_band(level, [](std::size_t i) { return i % 2 == 0 ? 0.01F : 0.0F; });
+    const test::EditScene scene = test::scene_with(surface, test::to_cloud(level.position), regions,
+                                                   test::resampling_by(deformations[d], resampling));
+    test::check_sound(test::resampled(scene, ResamplingEffort::kPreview));
+    const ResampledEdit edit = test::resampled(scene);
+    test::check_sound(edit);
+    test::check_sound(test::resampled(test::scene_after(edit, regions, scene.params)));
   }
 }
 
-TEST_CASE("two coinciding sheets that are squeezed together each keep some samples") {
-  test::Surface up = test::plane(24, 0.04, test::Sampling::kJittered);
-  up = test::moved(up, Vec3d(0.5, 0.0, 0.0));
-  test::Surface down = up;
-  for (std::size_t i = 0; i < down.size(); ++i) down.normal.set(i, -up.normal[i]);
-  // Both sheets twice: every place holds two samples that face up and two that face down.
-  const test::Surface both = test::joined({up, down, up, down});
-  const test::PulledPlane scene =
-      scene_of(both, Scaling{.center = Vec3d::UnitX(), .factors = Vec3d::Constant(1e-2)});
-  const ResampledEdit edit = resampled(scene);
-  check_whole(edit, both.size());
-  CHECK(edit.removed > both.size() / 10);
-  const Points& normal = edit.surface.finest().normal;
-  std::size_t facing_down = 0;
-  for (std::size_t i = 0; i < normal.size(); ++i)
-    facing_down += static_cast<std::size_t>(normal[i].z() < 0.0F);
-  CHECK(facing_down > normal.size() / 4);
-  CHECK(facing_down < normal.size() - normal.size() / 4);
+TEST_CASE("a handful of samples can be resampled") {
+  for (std::size_t n = 0; n <= 12; ++n) {
+    test::Random random(n);
+    Points points(n);
+    for (std::size_t i = 0; i < n; ++i)
+      points.set(i, Vec3d(random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), 0.0).cast<float>());
+    const Level level = level_from(test::coherent(points));
+    check_all(level, everything(), awkward_deformations());
+    check_all(level, left_and_right(0.5F), awkward_deformations());
+  }
+}
+
+TEST_CASE("samples at one place, on a line, and in pairs") {
+  check_all(level_from(test::identical(40, {0.1F, 0.2F, 0.3F})), everything(), awkward_deformations());
+  check_all(level_from(test::collinear(40, {-1.0F, 0.0F, 0.0F}, {1.0F, 0.0F, 0.0F})), left_and_right(0.5F),
+            awkward_deformations());
+  const test::Surface plane = test::plane(20, 0.1, test::Sampling::kJittered);
+  const Level pairs = test::level_of(test::joined({plane, plane}));
+  check_all(pairs, left_and_right(0.5F), awkward_deformations());
+  check_all(pairs, everything(), awkward_deformations());
+}
+
+TEST_CASE("samples without a spacing or without neighbours do not split") {
+  const Level level = level_from(test::identical(40, {0.1F, 0.2F, 0.3F}));
+  const test::EditScene scene =
+      test::scene_with({.levels = {level}, .detail = {}}, test::to_cloud(level.position), everything(),
+                       test::resampling_by(Scaling{.factors = Vec3d::Constant(100.0)}));
+  CHECK(scene.sampling->graph->k == 0);
+  CHECK(test::resampled(scene).inserted == 0);
+  const Level plane = test::level_of(test::plane(10, 0.1, test::Sampling::kJittered));
+  test::EditScene none = test::scene_with({.levels = {plane}, .detail = {}}, test::to_cloud(plane.position),
+                                          everything(), scene.params);
+  pointwright::Sampling sampling = *none.sampling;
+  std::fill(sampling.spacing.begin(), sampling.spacing.end(), 0.0F);
+  none.sampling = std::make_shared<const pointwright::Sampling>(std::move(sampling));
+  CHECK(test::resampled(none).inserted == 0);
+}
+
+TEST_CASE("regions that nearly touch stretch without limit, and samples split into at most 64") {
+  const Level plane = test::level_of(test::plane(40, 0.05, test::Sampling::kJittered));
+  for (const float gap : {0.02F, 1e-3F, 0.0F}) {
+    check_all(plane, left_and_right(gap),
+              {Translation{.vector = Vec3d(0.0, 0.0, 1e6)}, Translation{.vector = Vec3d(0.0, 0.0, 1e-3)},
+               Rotation{.axis = Vec3d::UnitZ(), .angle_rad = 600.0}});
+  }
+  // Painted beside each other, without a gap.
+  const test::EditScene scene = test::scene_of(
+      {.levels = {plane}, .detail = {}}, [](const Vec3f& p) { return p.x() < 0.0F ? 1 : 2; },
+      test::resampling_by(Translation{.vector = Vec3d(0.0, 0.0, 5.0)}));
+  test::check_sound(test::resampled(scene));
+}
+
+TEST_CASE("folds and enormous stretches stay finite") {
+  const Level plane = test::level_of(test::plane(40, 0.05, test::Sampling::kJittered));
+  const test::EditScene scene = test::scene_of(
+      {.levels = {plane}, .detail = {}},
+      [](const Vec3f& p) { return p.norm() > 0.9F   ? 1
+                                  : p.norm() < 0.2F ? 2
+                                                    : 0; },
+      test::resampling_by(Translation{.vector = Vec3d(0.9, 0.0, 0.0)}, {.collect = 0.7}));
+  const ResampledEdit folded = test::resampled(scene);
+  test::check_sound(folded);
+  CHECK(folded.inserted > 0);
+  CHECK(folded.removed > 0);
+  test::EditScene far = scene;
+  for (const double length : {1e6, 1e9}) {
+    far.params = test::resampling_by(Translation{.vector = Vec3d(0.0, 0.0, length)});
+    const ResampledEdit edit = test::resampled(far);
+    test::check_sound(edit);
+    CHECK(edit.sampling->size() <= 64 * scene.sampling->size());
+  }
+  // Scaled again and again, far beyond what squares of floats can hold.
+  const std::vector<ElementaryDeformation> growth(8, Scaling{.factors = Vec3d::Constant(1000.0)});
+  const test::EditScene grown =
+      test::scene_with({.levels = {plane}, .detail = {}}, test::to_cloud(plane.position), everything(),
+                       test::resampling_by(Deformation(growth)));
+  const ResampledEdit enormous = test::resampled(grown);
+  test::check_sound(enormous);
+  CHECK(enormous.inserted == 63 * grown.sampling->size());
+  const StretchColumns columns = stretch_columns(*enormous.sampling);
+  for (std::size_t i = 0; i < columns.major.size(); ++i) {
+    REQUIRE(std::isfinite(columns.major[i]));
+    REQUIRE(std::isfinite(columns.minor[i]));
+    REQUIRE(std::isfinite(columns.anisotropy[i]));
+  }
+}
+
+TEST_CASE("nothing of a tangled model is lost: any order of edits stays sound") {
+  test::Random random(11);
+  const Level sphere = test::level_of(test::sphere(800, 1.0, test::Sampling::kRandom));
+  test::EditScene scene = test::scene_of(
+      {.levels = {sphere}, .detail = {}},
+      [](const Vec3f& p) { return p.z() < -0.2F  ? 1
+                                  : p.z() > 0.5F ? 2
+                                                 : 0; },
+      test::resampling_by(Translation{}));
+  const RegionPair regions = scene.regions;
+  for (int step = 0; step < 12; ++step) {
+    const std::vector<Deformation> all = {
+        Translation{.vector = random.uniform(0.1, 0.8) * random.direction()},
+        Rotation{.axis = random.direction(), .angle_rad = random.uniform(-2.0, 2.0)},
+        Scaling{.factors =
+                    Vec3d(random.uniform(0.5, 1.8), random.uniform(0.5, 1.8), random.uniform(0.5, 1.8))},
+        NormalOffset{.distance = random.uniform(-0.2, 0.3)}};
+    EditParams params = test::resampling_by(
+        all[random.below(all.size())],
+        {.max_samples = 200'000, .shear_aware = step % 2 == 0, .collect = step % 3 == 0 ? 0.7 : 0.0});
+    const ResampledEdit edit = test::resampled(
+        test::scene_after({.surface = scene.surface, .sampling = scene.sampling}, regions, params));
+    test::check_sound(edit);
+    scene.surface = edit.surface;
+    scene.sampling = edit.sampling;
+  }
+  CHECK(scene.sampling->size() > 100);
 }
 
 }  // namespace
