@@ -108,6 +108,7 @@ Points children_at_rest(const Scene& scene) {
   RestPatches patches(level, *scene.sampling->graph);
   patches.require(parents);
   Births births = give_birth(splits.value(), patches, *scene.sampling, rest, mapped.cells, scene.field);
+  RelaxationMemory memory;
   relax({.map = map,
          .regions = scene.regions,
          .blend = scene.params.blend,
@@ -117,9 +118,10 @@ Points children_at_rest(const Scene& scene) {
          .rest = rest,
          .rest_position = level.position,
          .deformed = mapped.position,
+         .blocks = blocks,
          .params = params,
          .coarser = 1.0F},
-        params.sweeps, births);
+        params.sweeps, births, memory);
   Points children(births.x.size());
   for (std::size_t c = 0; c < births.x.size(); ++c)
     children.set(c,
