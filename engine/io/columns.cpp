@@ -170,7 +170,13 @@ Result<ImportedCloud> assemble_cloud(std::vector<ScalarAttribute> columns, Impor
 }
 
 ExportView::ExportView(const Cloud& cloud, bool caller_order) : cloud_(cloud), order_(cloud.size()) {
-  for (std::uint32_t i = 0; i < order_.size(); ++i) order_[caller_order ? cloud.id[i] : i] = i;
+  // Ids have gaps where samples were removed.
+  const bool has_gaps = caller_order && std::any_of(cloud.id.begin(), cloud.id.end(),
+                                                    [&](std::uint32_t id) { return id >= order_.size(); });
+  for (std::uint32_t i = 0; i < order_.size(); ++i) order_[caller_order && !has_gaps ? cloud.id[i] : i] = i;
+  if (has_gaps)
+    std::sort(order_.begin(), order_.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return cloud.id[a] < cloud.id[b]; });
   needs_double_ = cloud.position_is_double;
   for (std::uint32_t i = 0; !needs_double_ && i < order_.size(); ++i) {
     const auto p = position(i);

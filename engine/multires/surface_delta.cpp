@@ -57,19 +57,31 @@ std::uint64_t sum_of(const Bits& bits, std::size_t column, std::size_t block) {
   return sum * odd_number((std::uint64_t{column} << 40U) + block);
 }
 
-// The columns of a surface in one fixed order.
+// The columns of a surface in one fixed order, as far as `count` samples go.
 template <typename Float, typename Surface>
-std::vector<ColumnView<Float>> columns_of(Surface& surface) {
+std::vector<ColumnView<Float>> columns_of(Surface& surface, std::size_t count) {
   std::vector<ColumnView<Float>> columns;
   columns.reserve(surface.levels.size() * 6 + surface.detail.size());
   for (auto& level : surface.levels) {
     for (auto* points : {&level.position, &level.normal}) {
-      const std::size_t size = padded_to_block(points->size());
+      POINTWRIGHT_CHECK(points->size() >= count, "levels of the same samples");
+      const std::size_t size = padded_to_block(count);
       for (Float* data : {points->x(), points->y(), points->z()}) columns.push_back({data, size});
     }
   }
-  for (auto& detail : surface.detail) columns.push_back({detail.data(), detail.size()});
+  for (auto& detail : surface.detail) {
+    POINTWRIGHT_CHECK(detail.size() >= count, "one detail per sample");
+    columns.push_back({detail.data(), count});
+  }
   return columns;
+}
+
+void resize(MultiresSurface& surface, std::size_t count) {
+  for (Level& level : surface.levels) {
+    level.position.resize(count);
+    level.normal.resize(count);
+  }
+  for (std::vector<float>& detail : surface.detail) detail.resize(count);
 }
 
 // Calls body(block) for the blocks whose bits are set.
@@ -85,17 +97,23 @@ struct SurfaceDelta::Pair {
   ColumnView<const float> b;
 };
 
-SurfaceDelta::SurfaceDelta(const MultiresSurface& a, const MultiresSurface& b) {
-  const auto of_a = columns_of<const float>(a);
-  const auto of_b = columns_of<const float>(b);
+SurfaceDelta::SurfaceDelta(const MultiresSurface& a, const MultiresSurface& b)
+    : least_(std::min(a.sample_count(), b.sample_count())),
+      most_(std::max(a.sample_count(), b.sample_count())) {
+  // The padding of the smaller one is compared with what the larger one has there.
+  const auto of_a = columns_of<const float>(a, least_);
+  const auto of_b = columns_of<const float>(b, least_);
   POINTWRIGHT_CHECK(of_a.size() == of_b.size() && a.levels.size() == b.levels.size(),
                     "surfaces with the same levels and bands");
   columns_.resize(of_a.size());
   for (std::size_t c = 0; c < columns_.size(); ++c) {
-    POINTWRIGHT_CHECK(of_a[c].size == of_b[c].size, "surfaces of the same samples");
     sums_ = sums_ + compare({of_a[c], of_b[c]}, c, columns_[c]);
     blocks_ += columns_[c].bits.size() / kSimdBlock;
   }
+  if (most_ == least_) return;
+  const MultiresSurface& larger = a.sample_count() == most_ ? a : b;
+  for (const ColumnView<const float>& column : columns_of<const float>(larger, most_))
+    tail_.emplace_back(column.data + least_, column.data + column.size);
 }
 
 SurfaceDelta::Sums SurfaceDelta::compare(const Pair& pair, std::size_t number, Column& column) {
@@ -143,8 +161,20 @@ SurfaceDelta::Sums SurfaceDelta::compare(const Pair& pair, std::size_t number, C
   return sums;
 }
 
+// Not parallel: what is appended is little beside what a history copies, or its edit took far longer.
+void SurfaceDelta::append_tail(MultiresSurface& surface) const {
+  resize(surface, most_);
+  const auto views = columns_of<float>(surface, most_);
+  for (std::size_t c = 0; c < views.size(); ++c)
+    std::copy(tail_[c].begin(), tail_[c].end(), views[c].data + least_);
+}
+
 void SurfaceDelta::apply(MultiresSurface& surface) const {
-  const auto views = columns_of<float>(surface);
+  const std::size_t count = surface.sample_count();
+  POINTWRIGHT_CHECK(count == least_ || count == most_, "a surface with the samples of the delta");
+  const bool appends = most_ > least_ && count == least_;
+  if (count > least_) resize(surface, least_);
+  const auto views = columns_of<float>(surface, least_);
   POINTWRIGHT_CHECK(views.size() == columns_.size(), "a surface with the levels of the delta");
   std::uint64_t before = 0;
   for (std::size_t c = 0; c < columns_.size(); ++c) {
@@ -170,10 +200,12 @@ void SurfaceDelta::apply(MultiresSurface& surface) const {
         kWordSamples);
   }
   POINTWRIGHT_CHECK(before == sums_.a || before == sums_.b, "one of the two surfaces of the delta");
+  if (appends) append_tail(surface);
 }
 
 std::uint64_t SurfaceDelta::memory() const {
-  std::uint64_t bytes = columns_.capacity() * sizeof(Column);
+  std::uint64_t bytes = columns_.capacity() * sizeof(Column) + tail_.capacity() * sizeof(tail_[0]);
+  for (const std::vector<float>& column : tail_) bytes += column.capacity() * sizeof(float);
   for (const Column& column : columns_) {
     bytes += column.changed.capacity() * sizeof(std::uint64_t);
     bytes += (column.first.capacity() + column.bits.capacity()) * sizeof(std::uint32_t);

@@ -138,7 +138,10 @@ JsonDocument to_json(const EditRecord& record) {
                       {"created", to_rfc3339(record.created)},
                       {"moved_samples", record.moved_samples},
                       {"zero_samples", record.zero_samples},
-                      {"one_samples", record.one_samples}};
+                      {"one_samples", record.one_samples},
+                      {"inserted", record.inserted},
+                      {"removed", record.removed},
+                      {"sample_count", record.sample_count}};
 }
 
 JsonDocument to_json(const InfoDocument& info) {

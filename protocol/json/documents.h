@@ -59,7 +59,7 @@ struct SessionSummary {
   SessionState state = SessionState::kBuilding;
   std::uint64_t revision = 0;
   TimePoint created;
-  std::uint64_t sample_count = 0;
+  std::uint64_t sample_count = 0;  ///< of the surface as edited; while building, of the cloud
 };
 
 struct SessionDocument {
@@ -85,6 +85,9 @@ struct EditRecord {
   std::uint64_t moved_samples = 0;
   std::uint64_t zero_samples = 0;
   std::uint64_t one_samples = 0;
+  std::uint64_t inserted = 0;      ///< samples, by resampling
+  std::uint64_t removed = 0;       ///< samples, by garbage collection
+  std::uint64_t sample_count = 0;  ///< after the edit
 };
 
 struct InfoDocument {

@@ -88,6 +88,30 @@ Deformation read_deformation(const Json& value, const std::string& pointer, Json
   return deformation;
 }
 
+/// Members that are not there keep their defaults.
+ResamplingParams read_resampling(const Json& value, const std::string& pointer, JsonErrors& errors) {
+  constexpr std::uint64_t kMostSamples = 0xFFFFFFFFU;
+  constexpr std::uint64_t kMostSweeps = 1000;  // the engine's own, tighter limit follows
+  ObjectReader object(value, pointer, errors);
+  ResamplingParams params;
+  for (const auto& [name, number] :
+       {std::pair("bound", &params.bound), std::pair("min_spacing", &params.min_spacing),
+        std::pair("collect", &params.collect)}) {
+    if (const Json* const member = object.optional(name))
+      *number = read_number(*member, object.pointer_to(name), errors).value_or(*number);
+  }
+  if (const Json* const member = object.optional("max_samples"))
+    params.max_samples = static_cast<std::uint32_t>(
+        read_integer(*member, object.pointer_to("max_samples"), errors, 0, kMostSamples).value_or(0));
+  if (const Json* const member = object.optional("shear_aware"))
+    params.shear_aware = read_bool(*member, object.pointer_to("shear_aware"), errors).value_or(false);
+  if (const Json* const member = object.optional("sweeps"))
+    params.sweeps = static_cast<std::uint32_t>(
+        read_integer(*member, object.pointer_to("sweeps"), errors, 0, kMostSweeps).value_or(0));
+  object.finish();
+  return params;
+}
+
 /// The engine's verdict. Of a single step it speaks as of the deformation itself, of a document's sequence of
 /// one it must not.
 Result<void> verdict_of(const Deformation& deformation, bool is_sequence) {
@@ -128,6 +152,11 @@ EditParams read_edit_members(ObjectReader& object) {
         edit.gains.push_back(static_cast<float>(gain.value_or(1.0)));
       }
     }
+  }
+  if (const Json* const resampling = object.optional("resampling")) {
+    const std::size_t before = errors.fault_count;
+    edit.resampling = read_resampling(*resampling, object.pointer_to("resampling"), errors);
+    if (errors.fault_count == before) add_verdict(validate(*edit.resampling), object.pointer(), errors);
   }
   return edit;
 }
@@ -253,10 +282,20 @@ JsonDocument to_json(const Deformation& deformation) {
   return JsonDocument{{"type", kDeformationNames[kSequence]}, {"steps", std::move(steps)}};
 }
 
+JsonDocument to_json(const ResamplingParams& resampling) {
+  return {{"bound", resampling.bound},
+          {"min_spacing", resampling.min_spacing},
+          {"max_samples", resampling.max_samples},
+          {"shear_aware", resampling.shear_aware},
+          {"sweeps", resampling.sweeps},
+          {"collect", resampling.collect}};
+}
+
 JsonDocument to_json(const EditParams& edit) {
   JsonDocument document{
       {"level", edit.level}, {"blend", blend_name(edit.blend)}, {"deformation", to_json(edit.deformation)}};
   for (const float gain : edit.gains) document["gains"].push_back(shortest(gain));
+  if (edit.resampling) document["resampling"] = to_json(*edit.resampling);
   return document;
 }
 

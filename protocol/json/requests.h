@@ -61,6 +61,7 @@ JsonDocument to_json(const Vec3d& vector);
 JsonDocument to_json(const Shape& shape);
 JsonDocument to_json(const PaintOperation& operation);
 JsonDocument to_json(const Deformation& deformation);
+JsonDocument to_json(const ResamplingParams& resampling);
 JsonDocument to_json(const EditParams& edit);
 
 std::string_view blend_name(Blend blend);         ///< "quartic"

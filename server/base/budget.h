@@ -30,6 +30,20 @@ class Budget {
       amount_ = amount;
     }
 
+    /// Holds so much more, where it is left. Returns whether it was.
+    [[nodiscard]] bool grow_by(std::uint64_t amount) {
+      const std::lock_guard lock(state_->mutex);
+      if (amount > state_->left()) return false;
+      state_->held += amount;
+      amount_ += amount;
+      return true;
+    }
+    /// What nobody holds of the whole budget.
+    [[nodiscard]] std::uint64_t left() const {
+      const std::lock_guard lock(state_->mutex);
+      return state_->left();
+    }
+
    private:
     std::shared_ptr<State> state_;
     std::uint64_t amount_;  // guarded by the state's mutex
@@ -52,12 +66,13 @@ class Budget {
     const std::uint64_t total;
     std::mutex mutex;  // guards held
     std::uint64_t held = 0;
+    [[nodiscard]] std::uint64_t left() const { return held < total ? total - held : 0; }
   };
 
   [[nodiscard]] std::shared_ptr<Hold> hold(std::uint64_t amount, bool even_beyond) {
     {
       const std::lock_guard lock(state_->mutex);
-      const bool fits = state_->held <= state_->total && amount <= state_->total - state_->held;
+      const bool fits = state_->held <= state_->total && amount <= state_->left();
       if (!fits && !(even_beyond && state_->held == 0)) return nullptr;
       state_->held += amount;
     }

@@ -23,6 +23,9 @@ constexpr std::array kTable = {
     LimitInfo{"max_sessions", &Limits::max_sessions, 1, 100'000, "sessions held at once"},
     LimitInfo{"max_session_bytes", &Limits::max_session_bytes, 1, kTebi,
               "memory of all sessions together, their histories included"},
+    LimitInfo{"max_session_samples", &Limits::max_session_samples, 1, 2'000'000'000,
+              "samples that resampling may bring one session to, within the memory of all sessions; at least "
+              "those of its cloud"},
     LimitInfo{
         "history_bytes", &Limits::history_bytes, 1, kTebi,
         "memory of one session's history: whole states and the steps between them; others are replayed"},

@@ -20,6 +20,7 @@ struct Limits {
   std::uint64_t max_image_pixels = 64ULL << 20U;
   std::uint64_t max_sessions = 32;
   std::uint64_t max_session_bytes = 8ULL << 30U;
+  std::uint64_t max_session_samples = 20'000'000;
   std::uint64_t history_bytes = 512ULL << 20U;
   std::uint64_t max_edits = 10'000;
   std::uint64_t max_operations = 10'000;

@@ -11,7 +11,10 @@ protocol::EditRecord record_document(const RecordedEdit& record) {
           .created = record.created,
           .moved_samples = record.moved_samples,
           .zero_samples = record.zero_samples,
-          .one_samples = record.one_samples};
+          .one_samples = record.one_samples,
+          .inserted = record.change.inserted,
+          .removed = record.change.removed,
+          .sample_count = record.sample_count};
 }
 
 }  // namespace

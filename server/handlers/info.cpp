@@ -32,11 +32,12 @@ Response get_readiness(Service& service, const Request& request) {
 }
 
 Response get_info(Service& service, const Request&) {
-  protocol::InfoDocument info{.version = POINTWRIGHT_VERSION,
-                              .limits = {},
-                              .formats = {"draco", "ply", "xyz"},
-                              .features = {"preview-stream", "undo", "single-resolution", "images",
-                                           "model-regions", "visible-outlines", "recipes", "partial-play"}};
+  protocol::InfoDocument info{
+      .version = POINTWRIGHT_VERSION,
+      .limits = {},
+      .formats = {"draco", "ply", "xyz"},
+      .features = {"preview-stream", "undo", "single-resolution", "images", "model-regions",
+                   "visible-outlines", "recipes", "partial-play", "resampling"}};
   for (const LimitInfo& limit : limit_table())
     info.limits.emplace_back(std::string(limit.name), service.config.limits.*limit.member);
   return json_response(protocol::to_json(info));

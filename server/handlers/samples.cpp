@@ -56,10 +56,8 @@ Response frame_response(Service& service, const Request& request, Session& sessi
     return not_modified(etag);
   const auto picture = picture_at(service, session, view, (attributes & protocol::kFrameT) != 0);
   if (!picture.ok()) return problem_response(picture.problem(), request);
-  const auto frame = computed(service.interactive, [&] {
-    return encode_picture(session.display().layout(), picture.value(), session.cloud(), view.level,
-                          attributes);
-  });
+  const auto frame =
+      computed(service.interactive, [&] { return encode_picture(picture.value(), view.level, attributes); });
   if (!frame.ok()) return problem_response(frame.problem(), request);
   auto answer = frame_answer(service, frame.value());
   if (!answer.ok()) return problem_response(answer.problem(), request);
@@ -81,8 +79,8 @@ Response file_response(Service& service, const Request& request, Session& sessio
   const auto picture = picture_at(service, session, view, false);
   if (!picture.ok()) return problem_response(picture.problem(), request);
   return cloud_file_response(
-      service, request, [&] { return session.edited_cloud(picture.value(), view.level); },
-      memory_of(session.cloud()),
+      service, request, [&] { return Session::edited_cloud(picture.value(), view.level); },
+      memory_of(picture.value().samples->cloud()),
       {.format = format, .name = session.name(), .etag = file_tag(picture.value().revision, format, view)});
 }
 

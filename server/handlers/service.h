@@ -24,6 +24,7 @@ struct ServiceParts {
   Decoder decode;
   ImageDecoder decode_image;
   HierarchyBuilder build;
+  Resampler resample;
   AssetTable assets;
   std::function<void(const std::string&)> report_failure = {};  ///< of tasks that nobody waits for
 };

@@ -105,6 +105,7 @@ int run_daemon(const Config& config) {
                     {.decode = confined_decoder(decoders),
                      .decode_image = confined_image_decoder(config.limits, decoders),
                      .build = build_hierarchy,
+                     .resample = apply_resampled_edit,
                      .assets = config.web_root.empty() ? AssetTable() : AssetTable::load(config.web_root),
                      .report_failure = [&log](const std::string& text) {
                        log.write(LogLevel::kError, "task-failed", {{"failure", text}});

@@ -9,12 +9,17 @@ namespace {
 /// Frames of one picture that are kept: viewers mostly ask for the same delta, newcomers for the key.
 constexpr std::size_t kKeptFrames = 3;
 
-protocol::FrameState frame_state(const Picture& picture, const Cloud& cloud, std::uint32_t level) {
+protocol::FrameState frame_state(const Picture& picture, std::uint32_t level) {
   return {.level = static_cast<std::uint8_t>(level),
           .revision = picture.revision,
           .sequence = picture.sequence,
-          .origin = cloud.origin,
-          .detail_range = picture.detail_range};
+          .origin = picture.samples->cloud().origin,
+          .detail_range = picture.detail_range,
+          .stretch_range = picture.samples->stretch_range};
+}
+
+protocol::FrameLayout layout_of(const Picture& picture) {
+  return protocol::FrameLayout(static_cast<std::uint32_t>(picture.samples->size()));
 }
 
 std::uint32_t finest_level(const Picture& picture) {
@@ -23,34 +28,31 @@ std::uint32_t finest_level(const Picture& picture) {
 
 }  // namespace
 
-protocol::FrameColumns frame_columns(const Picture& picture, const Cloud& cloud, std::uint32_t level) {
+protocol::FrameColumns frame_columns(const Picture& picture, std::uint32_t level) {
   const std::size_t n = picture.surface->sample_count();
   protocol::FrameColumns columns;
   columns.position = &picture.surface->levels[level].position;
   columns.normal = &picture.surface->levels[level].normal;
-  if (picture.field != nullptr) columns.t = std::span(picture.field->t).first(n);
+  if (picture.t != nullptr) columns.t = std::span(*picture.t).first(n);
   // The detail of a level is what carries it to the next finer one; of the finest one, what carried it there.
   if (picture.surface->band_count() > 0)
     columns.detail =
         std::span(picture.surface->detail[std::min<std::size_t>(level, picture.surface->band_count() - 1)])
             .first(n);
-  columns.color = cloud.color;
+  columns.stretch = picture.samples->stretch;
+  columns.color = picture.samples->cloud().color;
   columns.marks = *picture.marks;
-  columns.ids = cloud.id;
-  if (picture.splat_radius != nullptr) columns.radius = *picture.splat_radius;
+  columns.ids = picture.samples->cloud().id;
+  columns.radius = *picture.samples->splat_radius;
   return columns;
 }
 
-SharedFrame encode_picture(const protocol::FrameLayout& layout, const Picture& picture, const Cloud& cloud,
-                           std::uint32_t level, std::uint16_t attributes) {
+SharedFrame encode_picture(const Picture& picture, std::uint32_t level, std::uint16_t attributes) {
   auto bytes = std::make_shared<protocol::FrameBytes>();
-  encode_key_frame(layout, frame_columns(picture, cloud, level), frame_state(picture, cloud, level),
-                   attributes, *bytes);
+  encode_key_frame(layout_of(picture), frame_columns(picture, level), frame_state(picture, level), attributes,
+                   *bytes);
   return bytes;
 }
-
-Display::Display(std::shared_ptr<const Cloud> cloud)
-    : cloud_(std::move(cloud)), layout_(static_cast<std::uint32_t>(cloud_->size())) {}
 
 std::shared_ptr<Display::Shown> Display::shown() const {
   const std::lock_guard lock(mutex_);
@@ -72,18 +74,23 @@ void Display::publish(Picture picture) {
   auto after = std::make_shared<Shown>();
   after->picture = std::move(picture);
   after->bounds = protocol::surface_bounds(after->picture.surface->finest().position);
-  if (before == nullptr) {
-    after->version = after->key_version = 1;
-    after->block_versions.assign(layout_.block_count(), 1);
+  const Picture& now = after->picture;
+  if (before == nullptr || !are_same(*before->picture.samples, *now.samples)) {
+    // Other samples have other places in frames, and their own ids and radii.
+    after->version = after->key_version = before == nullptr ? 1 : before->version + 1;
+    after->layout = layout_of(now);
+    after->block_versions.assign(after->layout.block_count(), after->version);
   } else {
     after->version = before->version + 1;
     after->key_version = before->key_version;
+    after->layout = before->layout;
     after->block_versions = before->block_versions;
-    const Picture& now = after->picture;
-    if (now.detail_range != before->picture.detail_range) after->key_version = after->version;
-    const auto changed = protocol::changed_blocks(
-        layout_, frame_columns(before->picture, *cloud_, finest_level(now)),
-        frame_columns(now, *cloud_, finest_level(now)), protocol::kAllFrameAttributes);
+    if (now.detail_range != before->picture.detail_range ||
+        now.samples->stretch_range != before->picture.samples->stretch_range)
+      after->key_version = after->version;
+    const auto changed =
+        protocol::changed_blocks(after->layout, frame_columns(before->picture, finest_level(now)),
+                                 frame_columns(now, finest_level(now)), protocol::kAllFrameAttributes);
     for (const std::uint32_t block : changed) after->block_versions[block] = after->version;
   }
   const std::lock_guard lock(mutex_);
@@ -106,17 +113,17 @@ Display::Frame Display::frame_since(std::uint64_t version, std::uint16_t attribu
     return {frames.front().bytes, now->version};
   }
   const std::uint32_t level = finest_level(now->picture);
-  auto state = frame_state(now->picture, *cloud_, level);
+  auto state = frame_state(now->picture, level);
   state.bounds = now->bounds;
-  const auto columns = frame_columns(now->picture, *cloud_, level);
+  const auto columns = frame_columns(now->picture, level);
   auto bytes = std::make_shared<protocol::FrameBytes>();
   if (since == 0) {
-    encode_key_frame(layout_, columns, state, attributes, *bytes);
+    encode_key_frame(now->layout, columns, state, attributes, *bytes);
   } else {
     std::vector<std::uint32_t> blocks;
-    for (std::uint32_t block = 0; block < layout_.block_count(); ++block)
+    for (std::uint32_t block = 0; block < now->layout.block_count(); ++block)
       if (now->block_versions[block] > since) blocks.push_back(block);
-    encode_delta_frame(layout_, columns, state, attributes, blocks, *bytes);
+    encode_delta_frame(now->layout, columns, state, attributes, blocks, *bytes);
   }
   if (frames.size() == kKeptFrames) frames.pop_back();
   frames.insert(frames.begin(), {.since = since, .attributes = attributes, .bytes = std::move(bytes)});

@@ -6,21 +6,20 @@
 #include <mutex>
 #include <vector>
 
-#include "engine/core/cloud.h"
 #include "engine/editing/painting.h"
-#include "engine/editing/scale_field.h"
 #include "engine/multires/surface.h"
 #include "protocol/frames/frame.h"
 #include "protocol/frames/layout.h"
+#include "server/sessions/sample_set.h"
 
 namespace pointwright::server {
 
 /// One thing shown. Immutable once published.
 struct Picture {
   std::shared_ptr<const MultiresSurface> surface;
-  std::shared_ptr<const ScaleField> field;  ///< null: t is 0 everywhere
+  std::shared_ptr<const std::vector<float>> t;  ///< may be padded; null: 0 everywhere
   std::shared_ptr<const Marks> marks;
-  std::shared_ptr<const std::vector<std::uint16_t>> splat_radius;  ///< bfloat16; the same in every picture
+  SharedSamples samples;
   float detail_range = 0.0F;
   std::uint64_t revision = 0;
   std::uint64_t sequence = 0;  ///< of the preview; 0 for the committed state
@@ -31,8 +30,6 @@ using SharedFrame = std::shared_ptr<const protocol::FrameBytes>;
 /// Publishes pictures and encodes frames between them. Thread-safe.
 class Display {
  public:
-  explicit Display(std::shared_ptr<const Cloud> cloud);
-
   /// Shows another picture: one writer at a time. Cost: O(N).
   void publish(Picture picture);
 
@@ -46,11 +43,9 @@ class Display {
     std::uint64_t version = 0;
   };
   /// The frame that brings a viewer which saw `version` (0: nothing) to the newest picture: a delta with the
-  /// blocks that changed since, or a key where the ranges differ. Frames are shared by all viewers that ask
-  /// for the same one.
+  /// blocks that changed since, or a key where the samples or the ranges differ. Frames are shared by all
+  /// viewers that ask for the same one.
   Frame frame_since(std::uint64_t version, std::uint16_t attributes);
-
-  [[nodiscard]] const protocol::FrameLayout& layout() const { return layout_; }
 
  private:
   struct KeptFrame {
@@ -60,6 +55,7 @@ class Display {
   };
   struct Shown {
     Picture picture;
+    protocol::FrameLayout layout;
     protocol::SurfaceBounds bounds;
     std::uint64_t version = 0;
     std::uint64_t key_version = 0;              // viewers of older pictures need a key
@@ -69,17 +65,14 @@ class Display {
   };
   [[nodiscard]] std::shared_ptr<Shown> shown() const;
 
-  std::shared_ptr<const Cloud> cloud_;
-  protocol::FrameLayout layout_;
   mutable std::mutex mutex_;  // guards shown_
   std::shared_ptr<Shown> shown_;
 };
 
 /// The columns of a picture's level, as frames take them.
-protocol::FrameColumns frame_columns(const Picture& picture, const Cloud& cloud, std::uint32_t level);
+protocol::FrameColumns frame_columns(const Picture& picture, std::uint32_t level);
 
 /// The key frame of a picture's level, on its own.
-SharedFrame encode_picture(const protocol::FrameLayout& layout, const Picture& picture, const Cloud& cloud,
-                           std::uint32_t level, std::uint16_t attributes);
+SharedFrame encode_picture(const Picture& picture, std::uint32_t level, std::uint16_t attributes);
 
 }  // namespace pointwright::server

@@ -34,6 +34,7 @@ struct Document {
   std::shared_ptr<const EditList> edits = {};  ///< the undone ones included
   std::size_t head = 0;                        ///< edits that are applied
   protocol::ModelBounds bounds = {};           ///< of the committed surface
+  double spacing = 0.0;                        ///< of its samples, the median; 0 while building
 
   [[nodiscard]] const Painting& painting(RegionKind kind) const {
     return kind == RegionKind::kZero ? zero : one;

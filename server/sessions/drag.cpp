@@ -29,11 +29,10 @@ struct Drag::Free {
 
 Drag::Drag(const RestModel& rest, SurfaceState state, std::shared_ptr<const ScaleField> field,
            const EditParams& params)
-    : origin_(rest.cloud->origin),
+    : origin_(rest.origin),
       state_(std::move(state)),
       field_(std::move(field)),
-      graph_(rest.graph),
-      plan_(*state_.surface, *graph_, params, *field_),
+      plan_(*state_.surface, state_.samples->graph(), params, *field_),
       free_(std::make_shared<Free>()) {}
 
 Drag::~Drag() = default;

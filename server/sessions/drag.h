@@ -33,7 +33,6 @@ class Drag {
   const Vec3d origin_;
   const SurfaceState state_;
   const std::shared_ptr<const ScaleField> field_;
-  const std::shared_ptr<const NeighborGraph> graph_;
   const EditPlan plan_;
   std::shared_ptr<Free> free_;
 };

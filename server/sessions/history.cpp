@@ -61,14 +61,15 @@ class History::Walk {
   [[nodiscard]] const SurfaceState& state() const { return state_; }
   [[nodiscard]] SurfaceState release() { return std::move(state_); }
 
-  void follow(const SurfaceDelta& delta, Place to) {
+  void follow(const SurfaceDelta& delta, const SharedSamples& samples, Place to) {
     // The surface that a walk starts from is others' too; what the walk has made is its own.
     if (own_ == nullptr) own_ = copy_of(*state_.surface);
     delta.apply(*own_);
     const Node& node = nodes_[to.node];
     state_ = {.surface = own_,
               .reports = to.derived ? node.derived_reports : node.reports,
-              .first_valid_level = to.derived ? 0 : node.first_valid_level};
+              .first_valid_level = to.derived ? 0 : node.first_valid_level,
+              .samples = samples};
     place_ = to;
   }
   void jump(SurfaceState state, Place to) {
@@ -79,9 +80,9 @@ class History::Walk {
 
   /// One edit back over the steps that are kept. Pre: they are.
   void step_back() {
-    if (place_.derived) follow(*nodes_[place_.node].derivation, {.node = place_.node, .derived = false});
     const Node& left = nodes_[place_.node];
-    follow(*left.step, {.node = place_.node - 1, .derived = left.from_derived});
+    if (place_.derived) follow(*left.derivation, state_.samples, {.node = place_.node, .derived = false});
+    follow(left.step->delta, left.step->before, {.node = place_.node - 1, .derived = left.from_derived});
   }
   /// To the side of the node that the next step starts from. Returns whether it got there.
   bool turn_to_next() {
@@ -89,14 +90,14 @@ class History::Walk {
     if (place_.derived == derived) return true;
     const auto& derivation = nodes_[place_.node].derivation;
     if (!derivation) return false;
-    follow(*derivation, {.node = place_.node, .derived = derived});
+    follow(*derivation, state_.samples, {.node = place_.node, .derived = derived});
     return true;
   }
   /// One edit on, where the step is kept. Returns whether it got there.
   bool step_on() {
     const auto& step = nodes_[place_.node + 1].step;
     if (!step) return false;
-    follow(*step, {.node = place_.node + 1, .derived = false});
+    follow(step->delta, step->after, {.node = place_.node + 1, .derived = false});
     return true;
   }
 
@@ -121,8 +122,15 @@ History::History(SurfaceState rest, std::uint64_t budget_bytes, Work work)
       Node{.reports = current_.reports, .first_valid_level = current_.first_valid_level, .whole = current_});
 }
 
+std::uint64_t History::Step::memory() const {
+  if (before == after) return delta.memory();
+  SamplesMemory added(before);
+  added.add(after);
+  return delta.memory() + added.bytes();
+}
+
 std::uint64_t History::memory() const {
-  return states_memory() + marks_memory();
+  return states_memory() + samples_memory() + marks_memory();
 }
 
 std::size_t History::whole_states() const {
@@ -151,13 +159,27 @@ std::uint64_t History::marks_memory() const {
 std::uint64_t History::states_memory() const {
   std::uint64_t bytes = 0;
   for (const Node& node : nodes_) {
-    if (node.step) bytes += node.step->memory();
+    if (node.step) bytes += node.step->delta.memory();
     if (node.derivation) bytes += node.derivation->memory();
     if (node.whole) bytes += memory_of(*node.whole);
   }
   const auto& whole = nodes_[head_].whole;
   if (!whole || whole->surface != current_.surface) bytes += memory_of(current_);
   return bytes;
+}
+
+std::uint64_t History::samples_memory() const {
+  // Those that the session starts with are as old as it is, and no part of its history.
+  SamplesMemory memory(nodes_.front().whole->samples);
+  for (const Node& node : nodes_) {
+    if (node.step) {
+      memory.add(node.step->before);
+      memory.add(node.step->after);
+    }
+    if (node.whole) memory.add(node.whole->samples);
+  }
+  memory.add(current_.samples);
+  return memory.bytes();
 }
 
 bool History::pays_whole(std::size_t node) const {
@@ -171,12 +193,36 @@ bool History::pays_whole(std::size_t node) const {
   return steps >= kStepsPerWhole * memory_of(current_) || last - node >= kEditsPerWhole;
 }
 
+History::SharedStep History::step_between(const SurfaceState& before, const SurfaceState& after) {
+  const bool same = before.samples == after.samples;
+  if (!same && !continues(*before.samples, *after.samples)) return nullptr;
+  return std::make_shared<const Step>(Step{.delta = SurfaceDelta(*before.surface, *after.surface),
+                                           .before = before.samples,
+                                           .after = after.samples});
+}
+
+void History::keep_whole(std::size_t node, const SurfaceState& state, bool derived) {
+  Node& kept = nodes_[node];
+  if (kept.whole || (derived && !kept.derivation)) return;
+  kept.whole = state;
+  if (!derived) return;
+  auto surface = copy_of(*state.surface);
+  kept.derivation->apply(*surface);
+  kept.whole->surface = std::move(surface);
+  kept.whole->reports = kept.reports;
+  kept.whole->first_valid_level = kept.first_valid_level;
+}
+
 void History::push(std::shared_ptr<const RecordedEdit> edit, SurfaceState after) {
   edits_.resize(head_);
   nodes_.resize(head_ + 1);
-  Node node{.step = std::make_shared<const SurfaceDelta>(*current_.surface, *after.surface)};
+  Node node{.step = step_between(current_, after)};
+  // Where samples are gone the state before is the way back.
+  if (!node.step) keep_whole(head_, current_, derived_);
   const Node& before = nodes_[head_];
-  if (derived_ && before.derivation && edit->params.level >= before.first_valid_level) {
+  // Inserted samples have places on all levels, derived ones included.
+  const bool inserts = node.step == nullptr || node.step->delta.further_samples() > 0;
+  if (derived_ && before.derivation && !inserts && edit->params.level >= before.first_valid_level) {
     // The edit needed none of the levels that were derived. Without them the state is what replaying makes
     // of the state before, and nothing has to be derived on the way back here.
     auto surface = copy_of(*after.surface);
@@ -264,8 +310,8 @@ Result<void> History::move_head(std::size_t edit) {
     if (walk.step_on()) continue;
     auto next = work_.replay(walk.state(), *edits_[from]);
     if (!next) return given_up(next.error());
-    nodes_[from + 1].step =
-        std::make_shared<const SurfaceDelta>(*walk.state().surface, *next.value().surface);
+    nodes_[from + 1].step = step_between(walk.state(), next.value());
+    if (!nodes_[from + 1].step) keep_whole(from, walk.state(), walk.place().derived);
     walk.jump(std::move(next).value(), {.node = from + 1, .derived = false});
     trim(edit);  // at every step: a long way must not take more memory than a short one
     const std::size_t left = edit - from - 1;
@@ -347,10 +393,12 @@ History::Victim History::cheapest_to_lose(std::size_t center) const {
 }
 
 std::uint64_t History::budget() const {
-  // Paintings cannot be replayed, so they are never dropped: beside them there is always room for the last
-  // steps, however many they are.
+  // Paintings cannot be replayed, so they are never dropped, nor are the samples of the current state: beside
+  // them there is always room for the last steps, however many they are.
   const std::uint64_t least = std::min(budget_bytes_, kLeastSurfaces * memory_of(current_));
-  return std::max(budget_bytes_, marks_memory() + least);
+  SamplesMemory samples(nodes_.front().whole->samples);
+  samples.add(current_.samples);
+  return std::max(budget_bytes_, marks_memory() + samples.bytes() + least);
 }
 
 void History::trim(std::size_t center) {

@@ -63,11 +63,20 @@ class History {
 
  private:
   using SharedDelta = std::shared_ptr<const SurfaceDelta>;
+  /// From one state to the next, which may have further samples.
+  struct Step {
+    SurfaceDelta delta;
+    SharedSamples before;
+    SharedSamples after;
+
+    [[nodiscard]] std::uint64_t memory() const;  ///< with those samples that the one before lacks
+  };
+  using SharedStep = std::shared_ptr<const Step>;
   /// The state after an edit. An edit of a coarse level that was stale is made from the derived state, and
-  /// its step leads from there.
+  /// its step leads from there. An edit that removed samples has no step.
   struct Node {
-    SharedDelta step = nullptr;  ///< from the node before
-    bool from_derived = false;   ///< from the derived state of that node
+    SharedStep step = nullptr;  ///< from the node before
+    bool from_derived = false;  ///< from the derived state of that node
     std::shared_ptr<const std::vector<DecompositionReport>> reports = nullptr;
     std::uint32_t first_valid_level = 0;
     SharedDelta derivation = nullptr;  ///< to the state with all levels valid
@@ -86,6 +95,8 @@ class History {
   class Walk;
   struct Victim;
 
+  static SharedStep step_between(const SurfaceState& before, const SurfaceState& after);
+  void keep_whole(std::size_t node, const SurfaceState& state, bool derived);
   [[nodiscard]] std::vector<Start> starts() const;
   /// What the way costs, in edits replayed; none where there is no way.
   [[nodiscard]] std::optional<double> cost_of_way(Place from, std::size_t edit) const;
@@ -94,6 +105,7 @@ class History {
   void trim(std::size_t center);
   [[nodiscard]] Victim cheapest_to_lose(std::size_t center) const;
   [[nodiscard]] std::uint64_t states_memory() const;
+  [[nodiscard]] std::uint64_t samples_memory() const;
   [[nodiscard]] std::uint64_t marks_memory() const;
 
   std::uint64_t budget_bytes_;

@@ -10,13 +10,13 @@ namespace pointwright::server {
 using protocol::Problem;
 using protocol::ProblemKind;
 
-PaintSurface paint_surface(const RestModel& rest, const SurfaceState& state) {
+PaintSurface paint_surface(const SurfaceState& state) {
   const Level& finest = state.surface->finest();
   return {.position = finest.position,
           .normal = finest.normal,
-          .origin = rest.cloud->origin,
-          .graph = rest.graph.get(),
-          .texcoord = &rest.cloud->texcoord};
+          .origin = state.samples->cloud().origin,
+          .graph = &state.samples->graph(),
+          .texcoord = &state.samples->cloud().texcoord};
 }
 
 Painter::Painter(const SessionParams& params, const PaintSurface& surface, const Painting& zero,

@@ -10,8 +10,8 @@
 
 namespace pointwright::server {
 
-/// The finest level of a state as a surface to paint on. The rest model and the state must outlive it.
-PaintSurface paint_surface(const RestModel& rest, const SurfaceState& state);
+/// The finest level of a state as a surface to paint on. The state must outlive it.
+PaintSurface paint_surface(const SurfaceState& state);
 
 /// Two regions that are being painted. Each list gives its region's samples by itself, here and on another
 /// sampling, in whatever order the two are replayed.

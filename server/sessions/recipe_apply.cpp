@@ -75,7 +75,9 @@ class Application {
     if (edit.paints) {
       if (auto problem = paint(index, edit)) return problem;
     }
+    if (whole_is_recorded_) shared_ids_ = whole_.samples->sampling->next_id;
     if (auto problem = record(index, recordable_part(edit.edit, part))) return problem;
+    const SharedSamples painted = whole_.samples;
     if (part == 1.0 && whole_is_recorded_) {
       whole_ = fork_.history.current();
     } else if (goes_on) {
@@ -84,12 +86,13 @@ class Application {
       if (!next) return problem_of_edit(next.error(), index);
       whole_ = std::move(next).value();
     }
+    marks_ = carried_marks(*painted, marks_, *whole_.samples);
     return std::nullopt;
   }
   [[nodiscard]] Session::Fork finish() {
-    if (marks_ == nullptr) return std::move(fork_);
+    if (recorded_marks_ == nullptr) return std::move(fork_);
     Document document = *fork_.document;
-    document.marks = marks_;
+    document.marks = recorded_marks_;
     document.zero = std::move(zero_);
     document.one = std::move(one_);
     fork_.document = std::make_shared<const Document>(std::move(document));
@@ -99,7 +102,7 @@ class Application {
  private:
   std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
     auto marks = std::make_shared<Marks>(whole_.surface->finest().position.size(), std::uint8_t{0});
-    Painter painter(session_.params(), paint_surface(session_.rest(), whole_), {}, {});
+    Painter painter(session_.params(), paint_surface(whole_), {}, {});
     const std::string place = place_of(index);
     if (auto problem = paint(painter, RegionKind::kZero, edit.zero, *marks, place + "/zero/operations"))
       return problem;
@@ -131,17 +134,15 @@ class Application {
       if (!derived) return problem_of_edit(derived.error(), index);
       history.replace_current(std::move(derived).value());
     }
-    auto after = played(session_, history.current(), params, marks_);
+    // Parts of edits may have inserted other samples than the whole ones that paintings are made on.
+    const SharedSamples samples = history.current().samples;
+    const SharedMarks marks =
+        carried_marks(*whole_.samples, marks_, *samples, nullptr, whole_is_recorded_ ? kAllIds : shared_ids_);
+    auto after = played(session_, history.current(), params, marks);
     if (!after) return problem_of_edit(after.error(), index);
-    auto recorded = std::make_shared<RecordedEdit>();
-    recorded->index = history.head() + 1;
-    recorded->params = params;
-    recorded->marks = marks_;
-    recorded->created = std::chrono::system_clock::now();
-    recorded->moved_samples = count_moved(*history.current().surface, *after.value().surface);
-    recorded->zero_samples = count_marked(*marks_, RegionKind::kZero);
-    recorded->one_samples = count_marked(*marks_, RegionKind::kOne);
-    history.push(std::move(recorded), std::move(after).value());
+    auto edit = record_of(history.head() + 1, params, marks, history.current(), after.value());
+    history.push(std::move(edit), std::move(after).value());
+    recorded_marks_ = carried_marks(*samples, marks, *history.current().samples);
     return std::nullopt;
   }
 
@@ -149,8 +150,10 @@ class Application {
   Session::Fork fork_;
   SurfaceState whole_;  // with all edits so far whole: what paintings are made on
   bool whole_is_recorded_ = true;
-  std::shared_ptr<const Marks> marks_;
-  Painting zero_;  // those of marks_
+  std::uint32_t shared_ids_ = kAllIds;  // of samples that both the whole and the recorded surface may have
+  SharedMarks marks_;                   // on the samples of whole_
+  SharedMarks recorded_marks_;          // on those of the history's current state
+  Painting zero_;                       // those of marks_
   Painting one_;
 };
 

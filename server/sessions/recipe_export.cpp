@@ -19,6 +19,17 @@ std::vector<PaintOperation> cover_of(const Session& session, const Points& posit
                           kind == RegionKind::kOne, &session.context());
 }
 
+/// The marks of an edit on the samples that it left: what the next one is made with where nobody painted.
+Outcome<SharedMarks> marks_after(KnownStates& states, const EditList& edits, std::size_t edit) {
+  const SharedMarks& marks = edits[edit]->marks;
+  if (!edits[edit]->params.resampling) return marks;
+  const auto before = states.after(edit);
+  if (!before.ok()) return before.problem();
+  const auto after = states.after(edit + 1);
+  if (!after.ok()) return after.problem();
+  return carried_marks(*before.value().samples, marks, *after.value().samples);
+}
+
 }  // namespace
 
 Outcome<RecipeText> export_recipe(Session& session, std::uint64_t max_bytes) {
@@ -32,7 +43,12 @@ Outcome<RecipeText> export_recipe(Session& session, std::uint64_t max_bytes) {
     const RecordedEdit& record = *(*now.edits)[i];
     protocol::RecipeEdit edit{.edit = record.params};
     // What is compared is what is marked, not who shares it: an undone painting leaves no trace.
-    edit.paints = i == 0 || *record.marks != *(*now.edits)[i - 1]->marks;
+    edit.paints = i == 0;
+    if (i > 0) {
+      const auto kept = marks_after(states, *now.edits, i - 1);
+      if (!kept.ok()) return kept.problem();
+      edit.paints = *record.marks != *kept.value();
+    }
     if (edit.paints) {
       const auto before = states.after(i);
       if (!before.ok()) return before.problem();

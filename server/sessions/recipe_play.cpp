@@ -28,10 +28,21 @@ Outcome<SurfaceState> together(Session& session, const EditList& edits, double s
   auto rest = KnownStates(session, edits).after(0);
   if (!rest.ok() || s == 0.0) return rest;
   SurfaceState state = std::move(rest.value());
-  for (const auto& edit : edits) {
-    auto next = played(session, state, recordable_part(edit->params, s), edit->marks);
+  KnownStates whole(session, edits);
+  bool resampled = false;
+  for (std::size_t i = 0; i < edits.size(); ++i) {
+    SharedMarks marks = edits[i]->marks;
+    if (resampled) {
+      // The edits part of the way have inserted other samples than the whole ones did.
+      const auto before = whole.after(i);
+      if (!before.ok()) return before.problem();
+      marks =
+          carried_marks(*before.value().samples, marks, *state.samples, nullptr, session.rest().uploaded_ids);
+    }
+    auto next = played(session, state, recordable_part(edits[i]->params, s), marks);
     if (!next) return protocol::to_problem(next.error());
     state = std::move(next).value();
+    resampled = resampled || edits[i]->params.resampling.has_value();
   }
   return state;
 }
@@ -104,13 +115,19 @@ Outcome<Picture> partial_picture(Session& session, std::uint32_t level, const Pl
   if (!reached.ok()) return reached.problem();
   auto state = with_valid_level(session.rest(), reached.value(), level, session.context());
   if (!state) return protocol::to_problem(state.error());
-  std::shared_ptr<const ScaleField> field;
+  // What edits part of the way insert are other samples than those that the whole ones did.
+  const std::uint32_t shared_ids = play.s == 1.0 ? kAllIds : session.rest().uploaded_ids;
+  const SharedMarks marks =
+      carried_marks(*now.surface.samples, now.marks, *state.value().samples, nullptr, shared_ids);
+  RegionField field;
   if (with_t) {
     const std::uint32_t coarsest = state.value().first_valid_level;
-    if (auto made = field_of(session.rest(), state.value(), coarsest, Blend::kQuartic, *now.marks); made)
+    if (auto made = field_of(state.value(), coarsest, Blend::kQuartic, *marks); made)
       field = made.value();  // without usable regions t is 0 everywhere
   }
-  return session.picture_of(now, state.value(), std::move(field), 0);
+  Picture picture = Session::picture_of(now, state.value(), field, 0);
+  picture.marks = marks;
+  return picture;
 }
 
 }  // namespace pointwright::server

@@ -4,7 +4,6 @@
 
 #include "engine/core/median.h"
 #include "engine/core/parallel.h"
-#include "engine/spatial/splat_radius.h"
 
 namespace pointwright::server {
 
@@ -36,14 +35,14 @@ Session::Session(SessionParams params, SessionServices services)
     : params_(std::move(params)),
       services_(std::move(services)),
       strand_(services_.interactive),
-      display_(params_.cloud),
       document_(std::make_shared<const Document>(
           Document{.bounds = model_bounds(params_.cloud->position, params_.cloud->origin)})) {
-  rest_ = RestModel{.cloud = params_.cloud,
-                    .params = params_.hierarchy,
+  rest_ = RestModel{.params = params_.hierarchy,
+                    .origin = params_.cloud->origin,
                     .diagonal = bounds_of(params_.cloud->position).diagonal(),
-                    .spacing = {},
-                    .build = services_.build};
+                    .build = services_.build,
+                    .resample = services_.resample,
+                    .room = params_.room};
 }
 
 std::shared_ptr<Session> Session::create(SessionParams params, SessionServices services) {
@@ -80,18 +79,17 @@ void Session::finish_building(Result<Hierarchy> built) {
   if (!built) return fail(protocol::to_problem(built.error()));
   Document document = *this->document();
   Hierarchy hierarchy = std::move(built).value();
-  const Level& rest = hierarchy.surface.finest();
-  auto radius = std::make_shared<std::vector<std::uint16_t>>();
-  for (const float value : splat_radii(rest.position, rest.normal, hierarchy.graph))
-    radius->push_back(protocol::to_bfloat16(value));
-  rest_.splat_radius = std::move(radius);
-  rest_.spacing = std::move(hierarchy.spacing);
-  rest_.graph = std::make_shared<const NeighborGraph>(std::move(hierarchy.graph));
-  median_spacing_ = median(rest_.spacing);
+  const SharedSamples samples = samples_at_rest(
+      rest_sampling(params_.cloud, std::make_shared<const NeighborGraph>(std::move(hierarchy.graph)),
+                    std::move(hierarchy.spacing)),
+      hierarchy.surface.finest());
+  document.spacing = median(samples->sampling->spacing);
+  rest_.uploaded_ids = samples->sampling->next_id;
   SurfaceState state{
       .surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
       .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),
-      .first_valid_level = 0};
+      .first_valid_level = 0,
+      .samples = samples};
   history_.emplace(
       state, params_.history_bytes,
       History::Work{
@@ -107,7 +105,7 @@ void Session::finish_building(Result<Hierarchy> built) {
   document.edits = std::make_shared<const EditList>();
   context_.begin_phase("ready", 1.0);
   // The picture first: whoever sees that the session is ready gets a frame of it.
-  display_.publish(picture_of(document, document.surface, nullptr, 0));
+  display_.publish(picture_of(document, document.surface, {}, 0));
   publish(std::move(document));
 }
 
@@ -131,6 +129,7 @@ void Session::note_time(const std::string& name, SteadyClock::time_point begin) 
 }
 
 protocol::SessionDocument Session::describe(const Document& document) const {
+  const bool is_ready = document.state == protocol::SessionState::kReady;
   protocol::SessionDocument result;
   result.summary = {.id = params_.id,
                     .name = params_.name,
@@ -138,7 +137,7 @@ protocol::SessionDocument Session::describe(const Document& document) const {
                     .state = document.state,
                     .revision = document.revision,
                     .created = created_,
-                    .sample_count = params_.cloud->size()};
+                    .sample_count = is_ready ? document.surface.samples->size() : params_.cloud->size()};
   result.progress = context_.progress();
   result.error = document.error;
   result.origin = params_.cloud->origin;
@@ -146,8 +145,8 @@ protocol::SessionDocument Session::describe(const Document& document) const {
   for (const float scale : params_.hierarchy.scales)
     result.level_scales.push_back(static_cast<double>(scale) * static_cast<double>(rest_.diagonal));
   result.level_scales.push_back(0.0);
-  if (document.state == protocol::SessionState::kReady) {
-    result.spacing = median_spacing_;
+  if (is_ready) {
+    result.spacing = document.spacing;
     result.decomposition = *document.surface.reports;
     result.zero = {.samples = document.zero.samples, .operations = document.zero.operations->size()};
     result.one = {.samples = document.one.samples, .operations = document.one.operations->size()};
@@ -208,12 +207,19 @@ Outcome<SharedDocument> Session::ready_document() const {
   return now;
 }
 
-Picture Session::picture_of(const Document& now, const SurfaceState& state, SharedField field,
-                            std::uint64_t sequence) const {
+Picture Session::picture_of(const Document& now, const SurfaceState& state, const RegionField& field,
+                            std::uint64_t sequence) {
+  std::shared_ptr<const std::vector<float>> t;
+  if (field.t != nullptr) {
+    t = {field.t, &field.t->t};
+    if (!are_same(*field.samples, *state.samples))
+      t = std::make_shared<const std::vector<float>>(
+          carried(*t, sources_of(*field.samples->sampling, *state.samples->sampling), 0.0F));
+  }
   return {.surface = state.surface,
-          .field = std::move(field),
-          .marks = now.marks,
-          .splat_radius = rest_.splat_radius,
+          .t = std::move(t),
+          .marks = carried_marks(*now.surface.samples, now.marks, *state.samples),
+          .samples = state.samples,
           .detail_range = detail_range_of(state),
           .revision = now.revision,
           .sequence = sequence};
@@ -222,6 +228,7 @@ Picture Session::picture_of(const Document& now, const SurfaceState& state, Shar
 void Session::show_committed() {
   const SharedDocument now = document();
   shows_preview_ = false;
+  published_field_ = shown_field_.t;
   display_.publish(picture_of(*now, now->surface, shown_field_, 0));
   feed_.notify();
 }
@@ -234,25 +241,24 @@ Outcome<Done> Session::ensure_level(std::uint32_t level) {
   if (!state) return protocol::to_problem(state.error());
   note_time("derive_levels", begin);
   document.surface = std::move(state).value();
-  last_preview_.reset();
-  drag_.reset();  // it was of the surface before
+  forget_drag();  // it was of the surface before
   history_->replace_current(document.surface);
   publish(std::move(document));
   return Done{};
 }
 
-Outcome<Session::SharedField> Session::ensure_field(std::uint32_t level, Blend blend) {
+Outcome<RegionField> Session::ensure_field(std::uint32_t level, Blend blend) {
   if (auto done = ensure_level(level); !done.ok()) return done.problem();
   const SharedDocument now = document();
   const FieldKey key{.surface = now->surface.surface, .marks = now->marks, .level = level, .blend = blend};
   active_level_ = level;
   if (field_key_ != key) {
     const auto begin = SteadyClock::now();
-    auto field = field_of(rest_, now->surface, level, blend, *now->marks);
+    auto field = field_of(now->surface, level, blend, *now->marks);
     note_time("field", begin);
     const std::lock_guard lock(field_mutex_);
     field_key_ = key;
-    field_ = field.ok() ? field.value() : nullptr;
+    field_ = field.ok() ? field.value() : RegionField{};
     field_problem_ = field.ok() ? std::nullopt : std::optional<Problem>(protocol::to_problem(field.error()));
   }
   shown_field_ = field_;
@@ -286,36 +292,38 @@ void Session::refresh_field() {
   if (now->zero.samples > 0 && now->one.samples > 0) {
     (void)ensure_field(std::max(active_level_, now->surface.first_valid_level), Blend::kQuartic);
   } else {
-    shown_field_ = nullptr;
+    shown_field_ = {};
   }
   show_field();
 }
 
 void Session::show_field() {
-  if (!shows_preview_ && display_.picture().field != shown_field_) show_committed();
+  if (!shows_preview_ && published_field_ != shown_field_.t) show_committed();
 }
 
-Outcome<SurfaceState> Session::compute(const EditParams& params) {
+void Session::forget_drag() {
+  last_preview_.reset();
+  drag_.forget();
+}
+
+Outcome<SurfaceState> Session::compute(const EditParams& params, ResamplingEffort effort) {
   auto field = ensure_field(params.level, params.blend);
   if (!field.ok()) return field.problem();
   const SharedDocument now = document();
-  if (last_preview_ && last_preview_->base == *field_key_ && last_preview_->params == params)
+  const bool previews = effort == ResamplingEffort::kPreview;
+  if (last_preview_ && last_preview_->base == *field_key_ && last_preview_->params == params &&
+      (previews || last_preview_->exact))
     return last_preview_->after;
   const auto begin = SteadyClock::now();
   last_preview_.reset();  // its surface may be written over
-  if (drag_ == nullptr || !drag_->serves(now->surface, field.value(), params)) {
-    drag_.reset();
-    drag_ = std::make_unique<Drag>(rest_, now->surface, field.value(), params);
-    note_time("plan", begin);
-  }
-  auto surface = drag_->frame(params);
-  if (auto reach = check_reach(*surface, params.level); !reach) return protocol::to_problem(reach.error());
-  SurfaceState after{.surface = std::move(surface),
-                     .reports = now->surface.reports,
-                     .first_valid_level = std::max(now->surface.first_valid_level, params.level)};
+  auto after = drag_.frame(rest_, now->surface, field.value(), params, effort, context_);
+  if (!after) return protocol::to_problem(after.error());
+  if (auto reach = check_reach(*after.value().surface, params.level); !reach)
+    return protocol::to_problem(reach.error());
   note_time("edit", begin);
-  last_preview_ = LastPreview{.base = *field_key_, .params = params, .after = after};
-  return after;
+  const bool exact = !previews || (!params.resampling && now->surface.samples->sampling->cell_u.empty());
+  last_preview_ = LastPreview{.base = *field_key_, .params = params, .after = after.value(), .exact = exact};
+  return after.value();
 }
 
 Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request, Expected expected) {
@@ -356,7 +364,13 @@ void Session::run_preview() {
   }
   if (!request || closed_reason()) return;
   const auto begin = SteadyClock::now();
-  const auto after = compute(request->edit);
+  auto after = compute(request->edit, ResamplingEffort::kPreview);
+  if (!after.ok() && request->edit.resampling) {
+    // There is no room for its samples: the hand goes on with those that are there, committing tells why.
+    EditParams plain = request->edit;
+    plain.resampling.reset();
+    after = compute(plain, ResamplingEffort::kPreview);
+  }
   if (!after.ok()) return;  // the regions were repainted meanwhile: the next preview is told so
   shows_preview_ = true;
   display_.publish(picture_of(*document(), after.value(), shown_field_, request->sequence));
@@ -373,11 +387,11 @@ Outcome<SharedFrame> Session::render_preview(const protocol::PreviewRequest& req
     const SharedDocument now = document();
     if (auto valid = validate(request.edit, *now->surface.surface); !valid)
       return protocol::to_problem(valid.error());
-    const auto after = compute(request.edit);
+    const auto after = compute(request.edit, ResamplingEffort::kPreview);
     if (!after.ok()) return after.problem();
     const Picture picture = picture_of(*now, after.value(), field_, request.sequence);
     const auto finest = static_cast<std::uint32_t>(picture.surface->band_count());
-    return encode_picture(display_.layout(), picture, *params_.cloud, finest, attributes);
+    return encode_picture(picture, finest, attributes);
   });
 }
 

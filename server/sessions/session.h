@@ -12,7 +12,7 @@
 #include "server/base/outcome.h"
 #include "server/sessions/display.h"
 #include "server/sessions/document.h"
-#include "server/sessions/drag.h"
+#include "server/sessions/edit_drag.h"
 #include "server/sessions/feed.h"
 #include "server/sessions/session_params.h"
 
@@ -29,6 +29,7 @@ class Session : public std::enable_shared_from_this<Session> {
   [[nodiscard]] const std::string& id() const { return params_.id; }
   [[nodiscard]] const std::string& name() const { return params_.name; }
   [[nodiscard]] const std::string& cloud_id() const { return params_.cloud_id; }
+  /// As it was uploaded.
   [[nodiscard]] const Cloud& cloud() const { return *params_.cloud; }
   [[nodiscard]] const SessionParams& params() const { return params_; }
   /// Pre: the session is ready
@@ -86,12 +87,13 @@ class Session : public std::enable_shared_from_this<Session> {
 
   /// The committed state with `level` valid; with t where the regions allow it.
   Outcome<Picture> committed_picture(std::uint32_t level, bool with_t);
-  /// What viewers see of a state: the committed one, or a preview's (sequence > 0).
-  [[nodiscard]] Picture picture_of(const Document& now, const SurfaceState& state,
-                                   std::shared_ptr<const ScaleField> field, std::uint64_t sequence) const;
-  /// The cloud as edited: the upload's columns in coherent order, moved samples at their new places on
-  /// `level` of the picture. Cost: a copy of the cloud.
-  [[nodiscard]] std::shared_ptr<const Cloud> edited_cloud(const Picture& picture, std::uint32_t level) const;
+  /// What viewers see of a state: the committed one, or a preview's (sequence > 0). Marks and t of other
+  /// samples than the state's are carried to them.
+  [[nodiscard]] static Picture picture_of(const Document& now, const SurfaceState& state,
+                                          const RegionField& field, std::uint64_t sequence);
+  /// The cloud as edited: the columns of the picture's samples in coherent order, moved ones at their new
+  /// places on `level` of the picture. Cost: a copy of the cloud.
+  [[nodiscard]] static std::shared_ptr<const Cloud> edited_cloud(const Picture& picture, std::uint32_t level);
   /// Those frame attributes that there is something to fill with.
   [[nodiscard]] std::uint16_t available_attributes(std::uint16_t asked) const;
 
@@ -112,10 +114,8 @@ class Session : public std::enable_shared_from_this<Session> {
     Blend blend = Blend::kQuartic;
     friend bool operator==(const FieldKey&, const FieldKey&) = default;
   };
-  using SharedField = std::shared_ptr<const ScaleField>;
 
   Session(SessionParams params, SessionServices services);
-
   // Everything below runs on the strand, except where it says otherwise.
   void build();  // on the background pool
   void finish_building(Result<Hierarchy> built);
@@ -129,9 +129,11 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<Done> check_open() const;
   Outcome<Done> check_revision(Expected expected) const;
   void end_drag();  // any thread
-  Outcome<SharedField> ensure_field(std::uint32_t level, Blend blend);
+  Outcome<RegionField> ensure_field(std::uint32_t level, Blend blend);
   Outcome<Done> ensure_level(std::uint32_t level);
-  Outcome<SurfaceState> compute(const EditParams& params);
+  Outcome<SurfaceState> compute(const EditParams& params, ResamplingEffort effort);
+  void forget_drag();
+  void take_over_history(Document& document) const;
   Outcome<Painted> repaint(RegionKind kind, const std::vector<PaintOperation>& operations, bool append,
                            Expected expected);
   [[nodiscard]] std::optional<Outcome<Done>> known_verdict(const Document& document,
@@ -163,27 +165,27 @@ class Session : public std::enable_shared_from_this<Session> {
   std::map<std::string, double> timings_;
   std::optional<std::string> closed_;
 
-  // Written once by finish_building(), before the document says that the session is ready.
-  RestModel rest_;
-  double median_spacing_ = 0.0;
+  RestModel rest_;  // written by finish_building(), before the document says that the session is ready
 
   // The strand's own.
   std::optional<History> history_;
-  SharedField shown_field_;
+  RegionField shown_field_;
+  std::shared_ptr<const ScaleField> published_field_;  // that of the committed picture which is shown
   std::uint32_t active_level_ = 0;
   bool shows_preview_ = false;
   struct LastPreview {
     FieldKey base;
     EditParams params;
     SurfaceState after;
+    bool exact = true;  // what a commit would record
   };
   std::optional<LastPreview> last_preview_;
-  std::unique_ptr<Drag> drag_;
+  EditDrag drag_;
 
   mutable std::mutex field_mutex_;  // guards the next three, which only the strand writes
   std::optional<FieldKey> field_key_;
   std::optional<protocol::Problem> field_problem_;
-  SharedField field_;
+  RegionField field_;
   std::atomic<bool> field_scheduled_{false};
 
   std::mutex preview_mutex_;  // guards the pending preview and the numbers of the drags

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "engine/core/median.h"
 #include "engine/core/moved_cloud.h"
 #include "server/sessions/painter.h"
 #include "server/sessions/session.h"
@@ -42,15 +43,13 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<Pa
   if (auto current = check_revision(expected); !current.ok()) return current.problem();
   const auto begin = SteadyClock::now();
   // What a drag shares belongs to the regions as they were.
-  last_preview_.reset();
-  drag_.reset();
+  forget_drag();
   const SharedDocument before = document();
   auto marks = std::make_shared<Marks>(*before->marks);
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
   const bool is_zero = kind == RegionKind::kZero;
-  Painter painter(params_, paint_surface(rest_, before->surface),
-                  append || !is_zero ? before->zero : Painting{},
+  Painter painter(params_, paint_surface(before->surface), append || !is_zero ? before->zero : Painting{},
                   append || is_zero ? before->one : Painting{});
   for (const PaintOperation& operation : operations) {
     if (auto painted = painter.paint(kind, operation, *marks, context_); !painted.ok())
@@ -88,26 +87,14 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, Expected e
     if (auto valid = validate(params, *before->surface.surface); !valid)
       return protocol::to_problem(valid.error());
     const auto begin = SteadyClock::now();
-    const auto computed = compute(params);
+    const auto computed = compute(params, ResamplingEffort::kExact);
     if (!computed.ok()) return computed.problem();
-    last_preview_.reset();
-    drag_.reset();  // the surface that it moved is the past
-    auto record = std::make_shared<RecordedEdit>();
-    record->index = before->head + 1;
-    record->params = params;
-    record->marks = before->marks;
-    record->created = std::chrono::system_clock::now();
-    record->moved_samples = count_moved(*before->surface.surface, *computed.value().surface);
-    record->zero_samples = before->zero.samples;
-    record->one_samples = before->one.samples;
-    history_->push(record, computed.value());
-
+    forget_drag();                 // the surface that it moved is the past
     Document after = *document();  // with the levels that computing may have derived
-    after.surface = history_->current();
-    after.edits = std::make_shared<const EditList>(history_->edits());
-    after.head = history_->head();
-    after.bounds = model_bounds(after.surface.surface->finest().position, params_.cloud->origin);
-    ++after.revision;
+    const auto record = record_of(before->head + 1, params, before->marks, after.surface, computed.value());
+    history_->push(record, computed.value());
+    after.marks = carried_marks(*after.surface.samples, after.marks, *history_->current().samples);
+    take_over_history(after);
     publish(std::move(after));
     note_time("commit", begin);
     end_drag();
@@ -115,6 +102,18 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, Expected e
     schedule_field();
     return Committed{.document = document(), .record = record};
   });
+}
+
+// What a document says of the history, and of the marks that are in it already; one revision on.
+void Session::take_over_history(Document& document) const {
+  document.surface = history_->current();
+  document.edits = std::make_shared<const EditList>(history_->edits());
+  document.head = history_->head();
+  document.bounds = model_bounds(document.surface.surface->finest().position, params_.cloud->origin);
+  document.spacing = median(document.surface.samples->sampling->spacing);
+  document.zero.samples = count_marked(*document.marks, RegionKind::kZero);
+  document.one.samples = count_marked(*document.marks, RegionKind::kOne);
+  ++document.revision;
 }
 
 Outcome<SharedDocument> Session::move_head(std::size_t edit, Expected expected) {
@@ -132,14 +131,14 @@ Outcome<SharedDocument> Session::move_head(std::size_t edit, Expected expected) 
                      .actual = static_cast<double>(edit)};
     if (edit == before->head) return before;  // idempotent
     const auto begin = SteadyClock::now();
-    last_preview_.reset();
-    drag_.reset();  // replaying wants the memory
+    forget_drag();  // replaying wants the memory
     if (auto moved = history_->move_head(edit); !moved) return protocol::to_problem(moved.error());
     Document after = *before;
-    after.surface = history_->current();
-    after.head = edit;
-    after.bounds = model_bounds(after.surface.surface->finest().position, params_.cloud->origin);
-    ++after.revision;
+    // The marks that the next edit was made with are of the samples that are there now.
+    const SharedMarks recorded = edit < before->edits->size() ? (*before->edits)[edit]->marks : nullptr;
+    after.marks =
+        carried_marks(*before->surface.samples, before->marks, *history_->current().samples, recorded);
+    take_over_history(after);
     publish(std::move(after));
     note_time("move_head", begin);
     show_committed();
@@ -162,15 +161,10 @@ Outcome<SharedDocument> Session::adopt(Fork fork) {
   return on_strand([&, this]() -> Outcome<SharedDocument> {
     if (auto open = check_open(); !open.ok()) return open.problem();
     if (auto current = check_revision(fork.document->revision); !current.ok()) return current.problem();
-    last_preview_.reset();
-    drag_.reset();  // the surface that it moved is the past
+    forget_drag();  // the surface that it moved is the past
     history_ = std::move(fork.history);
     Document after = *fork.document;
-    after.surface = history_->current();
-    after.edits = std::make_shared<const EditList>(history_->edits());
-    after.head = history_->head();
-    after.bounds = model_bounds(after.surface.surface->finest().position, params_.cloud->origin);
-    ++after.revision;
+    take_over_history(after);
     publish(std::move(after));
     end_drag();
     show_committed();
@@ -196,7 +190,7 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
   return on_strand([&, this]() -> Outcome<Picture> {
     if (auto open = check_open(); !open.ok()) return open.problem();
     if (auto done = ensure_level(level); !done.ok()) return done.problem();
-    std::shared_ptr<const ScaleField> field;
+    RegionField field;
     if (with_t) {
       auto made =
           ensure_field(std::max(active_level_, document()->surface.first_valid_level), Blend::kQuartic);
@@ -204,13 +198,13 @@ Outcome<Picture> Session::committed_picture(std::uint32_t level, bool with_t) {
       show_field();
     }
     const SharedDocument now = document();
-    return picture_of(*now, now->surface, std::move(field), 0);
+    return picture_of(*now, now->surface, field, 0);
   });
 }
 
-std::shared_ptr<const Cloud> Session::edited_cloud(const Picture& picture, std::uint32_t level) const {
+std::shared_ptr<const Cloud> Session::edited_cloud(const Picture& picture, std::uint32_t level) {
   const Level& now = picture.surface->levels[level];
-  return std::make_shared<const Cloud>(moved_cloud(*params_.cloud, now.position, now.normal));
+  return std::make_shared<const Cloud>(moved_cloud(picture.samples->cloud(), now.position, now.normal));
 }
 
 std::uint16_t Session::available_attributes(std::uint16_t asked) const {

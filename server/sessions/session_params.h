@@ -22,6 +22,7 @@ struct SessionParams {
   std::size_t max_edits = 0;
   std::size_t max_operations = 0;
   std::size_t max_painting_vertices = 1'000'000;
+  std::shared_ptr<SampleRoom> room = std::make_shared<SampleRoom>(kNoParent);  ///< for its samples
 };
 
 /// What a session computes with: `background` for what lasts for seconds, `interactive` for a waiting hand.
@@ -29,6 +30,7 @@ struct SessionServices {
   ComputePool& interactive;
   ComputePool& background;
   HierarchyBuilder build;
+  Resampler resample;
 };
 
 }  // namespace pointwright::server

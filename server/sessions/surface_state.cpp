@@ -6,6 +6,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/editing/region.h"
+#include "engine/resampling/carried_sampling.h"
 
 namespace pointwright::server {
 namespace {
@@ -30,6 +31,16 @@ void fit_scales(std::vector<float>& scales) {
   }
 }
 
+/// The parameters with no more samples than there is room for.
+EditParams within_room(const EditParams& params, const SampleRoom& room, std::size_t now) {
+  const std::uint64_t most =
+      std::min<std::uint64_t>(std::max<std::uint64_t>(room.most(), now), kNoParent - 1);
+  EditParams limited = params;
+  std::uint32_t& asked = limited.resampling->max_samples;
+  if (asked == 0 || asked > most) asked = static_cast<std::uint32_t>(most);
+  return limited;
+}
+
 }  // namespace
 
 std::uint64_t memory_of(const SurfaceState& state) {
@@ -46,7 +57,7 @@ Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState&
   // The levels that are valid stay as they are, to the bit: the coarsest of them is what the others are made
   // of. So looking at a level changes no later edit.
   const Level& from = state.surface->levels[valid];
-  Cloud current = *rest.cloud;
+  Cloud current = state.samples->cloud();
   current.position = from.position;
   current.normal = from.normal;
   current.exact_position.clear();
@@ -75,23 +86,52 @@ Result<SurfaceState> with_valid_level(const RestModel& rest, const SurfaceState&
     const float base = valid < reports->size() ? (*reports)[valid].scale : 0.0F;
     (*reports)[k].scale = std::sqrt(derived * derived + base * base);
   }
-  return SurfaceState{.surface = std::move(surface), .reports = std::move(reports), .first_valid_level = 0};
+  return SurfaceState{.surface = std::move(surface),
+                      .reports = std::move(reports),
+                      .first_valid_level = 0,
+                      .samples = state.samples};
 }
 
-Result<std::shared_ptr<const ScaleField>> field_of(const RestModel& rest, const SurfaceState& state,
-                                                   std::uint32_t level, Blend blend, const Marks& marks) {
+Result<RegionField> field_of(const SurfaceState& state, std::uint32_t level, Blend blend,
+                             const Marks& marks) {
   const Points& position = state.surface->levels[level].position;
-  auto regions = regions_from_marks(position, rest.spacing, marks, rest.cloud->origin);
+  const Sampling& sampling = *state.samples->sampling;
+  auto regions = regions_from_marks(position, sampling.spacing, marks, sampling.cloud->origin);
   if (!regions) return regions.error();
-  return std::make_shared<const ScaleField>(compute_scale_field(position, regions.value(), blend));
+  RegionField field{
+      .t = std::make_shared<const ScaleField>(compute_scale_field(position, regions.value(), blend)),
+      .regions = nullptr,
+      .samples = state.samples};
+  field.regions = std::make_shared<const RegionPair>(std::move(regions).value());
+  return field;
 }
 
-SurfaceState edited(const RestModel& rest, const SurfaceState& state, const EditParams& params,
-                    const ScaleField& field) {
-  return SurfaceState{.surface = std::make_shared<const MultiresSurface>(
-                          apply_edit(*state.surface, *rest.graph, params, field, rest.cloud->origin)),
-                      .reports = state.reports,
-                      .first_valid_level = std::max(state.first_valid_level, params.level)};
+SharedSamples carried_samples(const SurfaceState& before, const EditParams& params, const ScaleField& field) {
+  const auto& sampling = before.samples->sampling;
+  auto carried = carried_sampling(sampling, *before.surface, params, field);
+  return carried == sampling ? before.samples : samples_after(*before.samples, std::move(carried));
+}
+
+Result<SurfaceState> edited(const RestModel& rest, const SurfaceState& state, const EditParams& params,
+                            const RegionField& field, ResamplingEffort effort,
+                            const ExecutionContext& context) {
+  SurfaceState after{.surface = nullptr,
+                     .reports = state.reports,
+                     .first_valid_level = std::max(state.first_valid_level, params.level)};
+  if (!params.resampling) {
+    after.surface = std::make_shared<const MultiresSurface>(
+        apply_edit(*state.surface, state.samples->graph(), params, *field.t, rest.origin));
+    after.samples = carried_samples(state, params, *field.t);
+    return after;
+  }
+  auto edit = rest.resample(*state.surface, state.samples->sampling,
+                            within_room(params, *rest.room, state.samples->size()), *field.t, *field.regions,
+                            effort, &context);
+  if (!edit) return edit.error();
+  if (auto room = rest.room->take(edit.value().sampling->size()); !room) return room.error();
+  after.surface = std::make_shared<const MultiresSurface>(std::move(edit.value().surface));
+  after.samples = samples_after(*state.samples, std::move(edit.value().sampling));
+  return after;
 }
 
 Result<void> check_reach(const MultiresSurface& surface, std::uint32_t level) {
@@ -119,20 +159,45 @@ Result<SurfaceState> replayed(const RestModel& rest, const SurfaceState& before,
                               const ExecutionContext& context) {
   auto state = with_valid_level(rest, before, record.params.level, context);
   if (!state) return state.error();
-  auto field = field_of(rest, state.value(), record.params.level, record.params.blend, *record.marks);
+  auto field = field_of(state.value(), record.params.level, record.params.blend, *record.marks);
   if (!field) return field.error();
-  return edited(rest, state.value(), record.params, *field.value());
+  return edited(rest, state.value(), record.params, field.value(), ResamplingEffort::kExact, context);
 }
 
-std::size_t count_moved(const MultiresSurface& before, const MultiresSurface& after) {
-  const Level& a = before.finest();
-  const Level& b = after.finest();
-  return parallel_sum<std::size_t>(a.position.size(), 0, [&](std::size_t begin, std::size_t end) {
+std::size_t count_moved(const SurfaceState& before, const SurfaceState& after) {
+  const Level& a = before.surface->finest();
+  const Level& b = after.surface->finest();
+  const bool in_order = continues(*before.samples, *after.samples);
+  const std::vector<std::uint32_t> places =
+      in_order ? std::vector<std::uint32_t>{}
+               : sources_of(*before.samples->sampling, *after.samples->sampling);
+  const std::vector<std::uint32_t>& id = after.samples->cloud().id;
+  const std::uint32_t first_new = before.samples->sampling->next_id;
+  const std::size_t count = in_order ? a.position.size() : b.position.size();
+  return parallel_sum<std::size_t>(count, 0, [&](std::size_t begin, std::size_t end) {
     std::size_t moved = 0;
-    for (std::size_t i = begin; i < end; ++i)
-      if (a.position[i] != b.position[i] || a.normal[i] != b.normal[i]) ++moved;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (id[i] >= first_new) continue;  // its source is where it was split from
+      const std::size_t j = in_order ? i : places[i];
+      if (a.position[j] != b.position[i] || a.normal[j] != b.normal[i]) ++moved;
+    }
     return moved;
   });
+}
+
+std::shared_ptr<const RecordedEdit> record_of(std::size_t index, const EditParams& params, SharedMarks marks,
+                                              const SurfaceState& before, const SurfaceState& after) {
+  auto record = std::make_shared<RecordedEdit>();
+  record->index = index;
+  record->params = params;
+  record->created = std::chrono::system_clock::now();
+  record->moved_samples = count_moved(before, after);
+  record->zero_samples = count_marked(*marks, RegionKind::kZero);
+  record->one_samples = count_marked(*marks, RegionKind::kOne);
+  record->change = change_of(*before.samples, *after.samples);
+  record->sample_count = after.samples->size();
+  record->marks = std::move(marks);
+  return record;
 }
 
 }  // namespace pointwright::server

@@ -25,6 +25,10 @@ constexpr std::uint64_t kLiveSurfaces = 6;
 constexpr std::uint64_t kStencilBytes = 4 * NormalStencil::kNeighbors + 16;
 constexpr std::uint64_t kShapeBytes = 12;
 constexpr std::uint64_t kBytesPerNeighbor = 4;
+/// What an inserted sample takes besides, with its cell, its parent and its spacing in the samplings of the
+/// committed, the previewed and the shown state. Of those the columns of its cloud come to it.
+constexpr std::uint64_t kSamplings = 3;
+constexpr std::uint64_t kBytesInSampling = 38;
 /// Stored history states that a session may need at most before it thins them out, and the bytes a sample of
 /// one with one band.
 constexpr std::uint64_t kHistoryStates = 32;
@@ -52,7 +56,10 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
   const std::uint64_t more_bands = (request.params.scales.size() - 1) * kBytesPerBand;
   const std::uint64_t drag = (request.params.scales.size() + 1) * kStencilBytes + kShapeBytes;
   const std::uint64_t graph = request.params.neighbors * kBytesPerNeighbor;
-  const std::uint64_t live = samples * (kBytesPerSample + kLiveSurfaces * more_bands + drag + graph);
+  const std::uint64_t live_each = kBytesPerSample + kLiveSurfaces * more_bands + drag + graph;
+  const std::uint64_t live = samples * live_each;
+  const std::uint64_t columns = memory_of(*cloud->cloud) / std::max<std::uint64_t>(samples, 1);
+  const std::uint64_t inserted_each = live_each + kSamplings * (kBytesInSampling + graph + columns);
   const std::uint64_t history =
       std::min(limits_.history_bytes, samples * kHistoryStates * (kStateBytesPerSample + more_bands));
   const std::lock_guard lock(mutex_);
@@ -61,8 +68,8 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
                    .detail = "the server holds as many sessions as it may",
                    .limit = static_cast<double>(limits_.max_sessions),
                    .actual = static_cast<double>(entries_.size())};
-  entry.memory = memory_.hold(live + history);
-  if (entry.memory == nullptr)
+  auto memory = memory_.hold(live + history);
+  if (memory == nullptr)
     return Problem{.kind = ProblemKind::kOutOfSpace,
                    .detail = "the memory for sessions is used up",
                    .limit = static_cast<double>(memory_.total()),
@@ -76,8 +83,11 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
                        .history_bytes = history,
                        .max_edits = static_cast<std::size_t>(limits_.max_edits),
                        .max_operations = static_cast<std::size_t>(limits_.max_operations),
-                       .max_painting_vertices = static_cast<std::size_t>(limits_.max_painting_vertices)},
+                       .max_painting_vertices = static_cast<std::size_t>(limits_.max_painting_vertices),
+                       .room = std::make_shared<SampleRoom>(std::max(limits_.max_session_samples, samples),
+                                                            memory, samples, inserted_each)},
                       services_);
+  entry.memory = std::move(memory);
   entries_.push_back(entry);
   return entry.session;
 }

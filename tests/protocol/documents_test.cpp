@@ -123,8 +123,8 @@ TEST_CASE("the examples of requests pass their parsers and come back the same") 
     REQUIRE(operation.ok());
     CHECK(Json::parse(to_json(operation.value()).dump()) == example);
   }
-  for (const char* name : {"edit-translation", "edit-rotation", "edit-along-normal", "edit-scale",
-                           "edit-sequence", "edit-toward-point", "edit-twist"}) {
+  for (const char* name : {"edit-translation", "edit-rotation", "edit-along-normal", "edit-resampling",
+                           "edit-scale", "edit-sequence", "edit-toward-point", "edit-twist"}) {
     CAPTURE(name);
     const Json example = document(name);
     const auto edit = parse_edit(example);

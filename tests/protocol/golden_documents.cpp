@@ -118,16 +118,20 @@ std::vector<EditRecord> edits() {
            .created = created(),
            .moved_samples = 317000,
            .zero_samples = 120000,
-           .one_samples = 9500},
+           .one_samples = 9500,
+           .sample_count = 437645},
           {.index = 2,
            .edit = {.level = 0,
                     .deformation = Rotation{.point = Vec3d(0.0, 0.05, 0.0),
                                             .axis = Vec3d(0.0, 1.0, 0.0),
-                                            .angle_rad = to_radians(37.5)}},
+                                            .angle_rad = to_radians(37.5)},
+                    .resampling = ResamplingParams{.max_samples = 500'000}},
            .created = created(),
            .moved_samples = 317000,
            .zero_samples = 120000,
-           .one_samples = 9500}};
+           .one_samples = 9500,
+           .inserted = 21480,
+           .sample_count = 459125}};
 }
 
 /// Edits of the further kinds; edit-translation and edit-rotation are written by hand.
@@ -139,6 +143,13 @@ JsonDocument edit_of(const Deformation& deformation, Blend blend = Blend::kQuart
 
 Vec3d axis_point() {
   return {0.0, 0.05, 0.0};
+}
+
+EditParams resampling_edit() {
+  return {.level = 1,
+          .deformation = Translation{.vector = Vec3d(0.0, 0.0, 0.5)},
+          .resampling = ResamplingParams{
+              .bound = 2.0, .min_spacing = 0.0005, .shear_aware = true, .sweeps = 4, .collect = 0.7}};
 }
 
 Twist twist() {
@@ -209,6 +220,7 @@ std::vector<File> document_files() {
       {"painting", painting_document(RegionKind::kZero, 120000, shared_operations())},
       {"edit-list", edit_list(1, edits())},
       {"edit-along-normal", edit_of(NormalOffset{.distance = -0.004}, Blend::kCubic, {1.5F})},
+      {"edit-resampling", to_json(resampling_edit())},
       {"edit-scale", edit_of(Scaling{.center = axis_point(), .factors = Vec3d(1.5, 1.0, 1.5)})},
       {"edit-sequence", edit_of(sequence(), Blend::kCosine)},
       {"edit-toward-point",

@@ -341,6 +341,47 @@ TEST_CASE("every kind of deformation is read, checked and written back to the bi
                 parse_edit) == Pointers{"/gains/0"});
 }
 
+TEST_CASE("resampling has defaults, limits and nothing else") {
+  const auto edit_with = [](const std::string& resampling) {
+    return R"({"level":0,"deformation":{"type":"translation","vector":[0,0,1]},"resampling":)" + resampling +
+           "}";
+  };
+  CHECK(accepted(edit_with("{}"), parse_edit).resampling == ResamplingParams{});
+  CHECK_FALSE(accepted(R"({"level":0,"deformation":{"type":"translation","vector":[0,0,1]}})", parse_edit)
+                  .resampling.has_value());
+  const std::string full =
+      R"({"bound":1.05,"min_spacing":0.25,"max_samples":4294967295,"shear_aware":true,"sweeps":64,"collect":0.9})";
+  const auto edit = accepted(edit_with(full), parse_edit);
+  CHECK(edit.resampling == ResamplingParams{.bound = 1.05,
+                                            .min_spacing = 0.25,
+                                            .max_samples = 4294967295U,
+                                            .shear_aware = true,
+                                            .sweeps = 64,
+                                            .collect = 0.9});
+  CHECK(to_json(*edit.resampling).dump() == full);
+  CHECK(accepted(to_json(edit).dump(), parse_edit) == edit);
+  const auto faults = [&](const std::string& resampling) {
+    const Pointers of_edit = refused(edit_with(resampling), parse_edit);
+    std::string preview = edit_with(resampling);
+    preview.insert(1, R"("sequence":1,)");
+    CHECK(refused(preview, parse_preview) == of_edit);
+    return of_edit;
+  };
+  for (const char* value : {"null", "1.5", "[]", "true"}) CHECK(faults(value) == Pointers{"/resampling"});
+  for (const char* bound : {"1.0", "16.5", "\"2\"", "null", "-1", "true"})
+    CHECK(faults(R"({"bound":)" + std::string(bound) + "}") == Pointers{"/resampling/bound"});
+  for (const char* spacing : {"-0.1", "1e10", "null"})
+    CHECK(faults(R"({"min_spacing":)" + std::string(spacing) + "}") == Pointers{"/resampling/min_spacing"});
+  for (const char* most : {"-1", "0.5", "4294967296", "true"})
+    CHECK(faults(R"({"max_samples":)" + std::string(most) + "}") == Pointers{"/resampling/max_samples"});
+  for (const char* sweeps : {"-1", "65", "1e9", "0.5"})
+    CHECK(faults(R"({"sweeps":)" + std::string(sweeps) + "}") == Pointers{"/resampling/sweeps"});
+  for (const char* collect : {"-0.1", "0.95", "null"})
+    CHECK(faults(R"({"collect":)" + std::string(collect) + "}") == Pointers{"/resampling/collect"});
+  CHECK(faults(R"({"shear_aware":1})") == Pointers{"/resampling/shear_aware"});
+  CHECK(faults(R"({"limit":1})") == Pointers{"/resampling/limit"});
+}
+
 TEST_CASE("levels, sequences and heads are whole numbers in range") {
   const std::string rest = R"(,"deformation":{"type":"translation","vector":[0,0,1]}})";
   for (const char* level :

@@ -15,6 +15,7 @@
 #include "server/handlers/service.h"
 #include "server/ingest/png_reader.h"
 #include "server/routes/routes.h"
+#include "tests/server/stand_in_resampler.h"
 #include "tests/server/synthetic.h"
 #include "tests/support/png_file.h"
 
@@ -49,6 +50,7 @@ struct TestService {
                               const ImportParams& params) { return decode_cloud(bytes, format, params); },
                  .decode_image = [](std::span<const std::byte> bytes) { return read_png(bytes, {}); },
                  .build = build_hierarchy,
+                 .resample = test::double_every_tenth,
                  .assets = {}}) {}
 
   Answer ask(Method method, const std::string& target, const std::string& body = "",
@@ -361,6 +363,58 @@ TEST_CASE("an edit owes the current revision") {
   CHECK(history["edits"][0]["edit"]["deformation"]["type"] == "translation");
   CHECK(test.ask(Method::kPut, path + "/head", R"({"edit":0})").body["history"]["head"] == 0);
   CHECK(test.ask(Method::kPut, path + "/head", R"({"edit":9})").status == 422);
+}
+
+TEST_CASE("an edit with resampling says what became of the samples, and every answer is of them") {
+  TestService test;
+  const std::string path = test.open_painted();
+  const std::string stretch = kLift.substr(0, kLift.size() - 1) + R"(,"resampling":{"bound":2}})";
+  const Answer made = test.ask(Method::kPost, path + "/edits", stretch, if_match("*"));
+  REQUIRE(made.status == 201);
+  const auto inserted = made.body["inserted"].get<std::size_t>();
+  CHECK(inserted > 10);
+  CHECK(made.body["removed"] == 0);
+  CHECK(made.body["sample_count"] == 900 + inserted);
+  CHECK(made.body["edit"]["resampling"]["bound"] == 2.0);
+  CHECK(made.body["edit"]["resampling"]["sweeps"] == 8);
+  CHECK(test.get(path + "/edits").body["edits"][0] == made.body);
+  CHECK(test.get(path).body["sample_count"] == 900 + inserted);
+  CHECK(test.get("/v1/sessions").body["sessions"][0]["sample_count"] == 900 + inserted);
+  const std::string bytes = test.get(path + "/samples?format=frame&attributes=ids,detail").bytes;
+  const auto frame = protocol::decode_frame(std::as_bytes(std::span(bytes)));
+  REQUIRE(frame.ok());
+  CHECK(frame.value().header.sample_count == 900 + inserted);
+  CHECK(frame.value().header.stretch_range == 2.0F);
+  const std::string file = test.get(path + "/samples?format=ply").bytes;
+  const auto read = read_cloud(std::as_bytes(std::span(file)), CloudFormat::kPly, {});
+  REQUIRE(read.ok());
+  CHECK(read.value().cloud.size() == 900 + inserted);
+  std::string preview = stretch;
+  preview.insert(1, R"("sequence":1,)");
+  CHECK(test.ask(Method::kPost, path + "/preview", preview).status == 200);
+  CHECK(test.ask(Method::kPut, path + "/preview", preview).status == 204);
+  CHECK(test.ask(Method::kPut, path + "/head", R"({"edit":0})").body["sample_count"] == 900);
+}
+
+TEST_CASE("samples that there is no room for are refused with how many there are") {
+  const std::string stretch = kLift.substr(0, kLift.size() - 1) + R"(,"resampling":{}})";
+  for (const bool by_memory : {false, true}) {
+    CAPTURE(by_memory);
+    Config config;
+    config.limits.history_bytes = 100'000;
+    (by_memory ? config.limits.max_session_bytes : config.limits.max_session_samples) =
+        by_memory ? 690'000 : 905;
+    TestService test(config);
+    const std::string path = test.open_painted();
+    const Answer refused = test.ask(Method::kPost, path + "/edits", stretch, if_match("*"));
+    CHECK(refused.status == 413);
+    CHECK(refused.body["type"] == "/problems/limit-exceeded");
+    REQUIRE(refused.body["errors"].size() == 1);
+    CHECK(refused.body["errors"][0]["pointer"] == "/resampling/max_samples");
+    CHECK(refused.body["limit"].get<double>() >= 900.0);
+    CHECK(refused.body["limit"].get<double>() < refused.body["actual"].get<double>());
+    CHECK(test.ask(Method::kPost, path + "/edits", kLift, if_match("*")).status == 201);
+  }
 }
 
 TEST_CASE("samples come in every format, with tags that change with the revision") {

@@ -346,8 +346,8 @@ TEST_CASE("a session's edits play from the rest to the committed state, and noth
       const auto picture = partial_picture(*session, 2, {.s = s, .timing = timing}, true);
       REQUIRE(picture.ok());
       CHECK(picture.value().revision == before->revision);
-      CHECK(picture.value().field != nullptr);
-      const auto cloud = session->edited_cloud(picture.value(), 2);
+      CHECK(picture.value().t != nullptr);
+      const auto cloud = Session::edited_cloud(picture.value(), 2);
       if (frame == 0) CHECK(cloud->position == rest);
       if (frame == 10) CHECK(cloud->position == finest(*session).position);
       const Mat3d turned = Eigen::AngleAxisd(s * angle, Vec3d::UnitY()).toRotationMatrix();

@@ -185,16 +185,8 @@ TEST_CASE("every kind of edit gives the same bits previewed, committed, after ot
 
 TEST_CASE("looking at a level changes no later edit, and replaying gives what was there") {
   const auto open = [](Workshop& workshop) {
-    return Session::create(
-        {.id = "AAAAAAAAAAAAAAAAAAAAAA",
-         .name = "sheet",
-         .cloud_id = "BBBBBBBBBBBBBBBBBBBBBB",
-         .cloud = workshop.cloud,
-         .hierarchy = {.scales = {0.1F, 0.05F}},
-         .history_bytes = 1,
-         .max_edits = 50,
-         .max_operations = 5},
-        {.interactive = workshop.interactive, .background = workshop.background, .build = build_hierarchy});
+    workshop.hierarchy.scales = {0.1F, 0.05F};
+    return workshop.open(1);
   };
   Workshop workshop;
   const auto looked = open(workshop);
@@ -354,16 +346,8 @@ TEST_CASE("a preview that the end of its drag overtook is not shown over the com
 
 TEST_CASE("the base stays editable wherever the finest level was moved to") {
   Workshop workshop;
-  const auto session = Session::create(
-      {.id = "AAAAAAAAAAAAAAAAAAAAAA",
-       .name = "sheet",
-       .cloud_id = "BBBBBBBBBBBBBBBBBBBBBB",
-       .cloud = workshop.cloud,
-       .hierarchy = {.scales = {0.0002F}},
-       .history_bytes = 1ULL << 30U,
-       .max_edits = 50,
-       .max_operations = 5},
-      {.interactive = workshop.interactive, .background = workshop.background, .build = build_hierarchy});
+  workshop.hierarchy.scales = {0.0002F};
+  const auto session = workshop.open();
   REQUIRE(comes_true([&] { return session->document()->state == protocol::SessionState::kReady; }));
   REQUIRE(session->paint(RegionKind::kZero, left_of(0.2)).ok());
   REQUIRE(session->paint(RegionKind::kOne, right_of(0.8)).ok());
@@ -418,7 +402,7 @@ TEST_CASE("frames bring a viewer from any picture to the newest one") {
   const auto session = workshop.painted();
   const std::uint16_t attributes = protocol::kFrameNormal | protocol::kFrameT | protocol::kFrameMarks;
   REQUIRE(session->committed_picture(1, true).ok());
-  REQUIRE(comes_true([&] { return session->display().picture().field != nullptr; }));
+  REQUIRE(comes_true([&] { return session->display().picture().t != nullptr; }));
 
   std::map<std::uint32_t, std::vector<std::array<std::uint16_t, 4>>> blocks;
   std::uint64_t seen = 0;
@@ -477,7 +461,7 @@ TEST_CASE("the edited cloud keeps every attribute and the bits of what no edit m
   commit(*session, lift(0.5));
   const auto picture = session->committed_picture(1, false);
   REQUIRE(picture.ok());
-  const auto edited = session->edited_cloud(picture.value(), 1);
+  const auto edited = Session::edited_cloud(picture.value(), 1);
   const Cloud& now = *edited;
   CHECK(now.color == cloud->color);
   CHECK(now.id == cloud->id);

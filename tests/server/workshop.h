@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/sessions/session.h"
+#include "tests/server/stand_in_resampler.h"
 #include "tests/server/synthetic.h"
 
 namespace pointwright::test {
@@ -37,19 +38,26 @@ struct Workshop {
   std::size_t max_edits = 50;
   std::size_t max_operations = 5;
   std::size_t max_painting_vertices = 1'000'000;
+  std::uint64_t max_samples = 1'000'000;
+  Resampler resample = double_every_tenth;
 
   std::shared_ptr<Session> open(std::uint64_t history_bytes = 1ULL << 30U,
                                 HierarchyBuilder build = build_hierarchy) {
-    return Session::create({.id = "AAAAAAAAAAAAAAAAAAAAAA",
-                            .name = "sheet",
-                            .cloud_id = "BBBBBBBBBBBBBBBBBBBBBB",
-                            .cloud = cloud,
-                            .hierarchy = hierarchy,
-                            .history_bytes = history_bytes,
-                            .max_edits = max_edits,
-                            .max_operations = max_operations,
-                            .max_painting_vertices = max_painting_vertices},
-                           {.interactive = interactive, .background = background, .build = std::move(build)});
+    SessionParams params;
+    params.id = "AAAAAAAAAAAAAAAAAAAAAA";
+    params.name = "sheet";
+    params.cloud_id = "BBBBBBBBBBBBBBBBBBBBBB";
+    params.cloud = cloud;
+    params.hierarchy = hierarchy;
+    params.history_bytes = history_bytes;
+    params.max_edits = max_edits;
+    params.max_operations = max_operations;
+    params.max_painting_vertices = max_painting_vertices;
+    params.room = std::make_shared<SampleRoom>(max_samples);
+    return Session::create(std::move(params), {.interactive = interactive,
+                                               .background = background,
+                                               .build = std::move(build),
+                                               .resample = resample});
   }
   std::shared_ptr<Session> ready(std::uint64_t history_bytes = 1ULL << 30U) {
     auto session = open(history_bytes);

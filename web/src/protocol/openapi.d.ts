@@ -460,7 +460,7 @@ export interface paths {
         /**
          * The committed state, as a file or a frame
          * @description As a file: every attribute of the upload, in the caller's order, moved samples at their new places with current
-         *     normals. As a frame: a key frame.
+         *     normals; samples that edits inserted follow the uploaded ones in the order of their ids. As a frame: a key frame.
          */
         get: operations["getSamples"];
         put?: never;
@@ -631,6 +631,7 @@ export interface components {
             /** @description Grows by one with each painting, edit and head move */
             revision: components["schemas"]["Count"];
             created: components["schemas"]["Time"];
+            /** @description Of the surface as edited; while the session is building, of its cloud */
             sample_count: components["schemas"]["Count"];
         };
         SessionList: {
@@ -969,6 +970,21 @@ export interface components {
          * @enum {string}
          */
         Blend: "quartic" | "cubic" | "quintic" | "cosine";
+        /** @description Dynamic resampling: samples are inserted where the deformation stretches the surface. A sample is split along a principal axis of its cell where the axis has grown to `bound` of the sample's own spacing and to `min_spacing`. Absent: the samples stay the same ones. A preview with it sweeps less, removes nothing, and may insert fewer samples; where there is no room for its samples the drag shows the edit without resampling, and recording it is refused. */
+        Resampling: {
+            /** @description Of the spacing at rest. Absent: 1.5 */
+            bound?: number;
+            /** @description Axes shorter than this are not split, model units. Absent: 0 */
+            min_spacing?: number;
+            /** @description Samples that the surface may have afterwards; an edit that needs more is refused. 0 or absent: as many as the session may have (max_session_samples, and the memory for sessions) */
+            max_samples?: number;
+            /** @description Counts a stretch along one axis less where the other axis is squeezed: shear splits less. Absent: false */
+            shear_aware?: boolean;
+            /** @description Of relaxation. Absent: 8 */
+            sweeps?: number;
+            /** @description Garbage collection after the edit: of two samples that are each other's nearest in a squeezed place, one goes while they are closer than this, in spacings. 0 or absent: none is removed */
+            collect?: number;
+        };
         EditMembers: {
             /** @description The level that moves; the finest: no multiresolution */
             level: components["schemas"]["Count"];
@@ -976,6 +992,7 @@ export interface components {
             deformation: components["schemas"]["Deformation"];
             /** @description What multiplies the detail of each band, the one between levels k and k + 1, where t is 1, and 1 + t (gain - 1) on the way there; one number for each entry of the session's decomposition, of which those below the edited level do not count. Absent: 1 everywhere. 0 smooths a band away, negative numbers turn its detail inside out. */
             gains?: number[];
+            resampling?: components["schemas"]["Resampling"];
         };
         Edit: components["schemas"]["EditMembers"];
         Preview: components["schemas"]["EditMembers"] & {
@@ -990,6 +1007,12 @@ export interface components {
             moved_samples: components["schemas"]["Count"];
             zero_samples: components["schemas"]["Count"];
             one_samples: components["schemas"]["Count"];
+            /** @description Samples, by resampling */
+            inserted: components["schemas"]["Count"];
+            /** @description Samples, by garbage collection */
+            removed: components["schemas"]["Count"];
+            /** @description Of the surface after the edit */
+            sample_count: components["schemas"]["Count"];
         };
         EditList: {
             head: components["schemas"]["Count"];

@@ -175,6 +175,9 @@ export class MockSession {
       moved_samples: this.marks.length,
       zero_samples: 0,
       one_samples: 0,
+      inserted: 0,
+      removed: 0,
+      sample_count: this.marks.length,
     };
     this.edits.push(record);
     this.head += 1;
