@@ -14,8 +14,11 @@ export interface StagedSurface {
   dispose(): void;
 }
 
-const sameLayout = (a: SurfaceLayout, b: SurfaceLayout): boolean =>
-  (Object.keys(a) as (keyof SurfaceLayout)[]).every((key) => a[key] === b[key]);
+/** Whether a delta of layout `delta` belongs to the frame; radii are never in a delta, and stay as they are. */
+const continues = (frame: SurfaceLayout, delta: SurfaceLayout): boolean =>
+  (Object.keys(frame) as (keyof SurfaceLayout)[]).every(
+    (key) => key === "hasRadius" || frame[key] === delta[key],
+  );
 
 /**
  * The frame on the screen, and the next one while it comes. Key frames may hold other samples in other blocks, as each frame
@@ -51,7 +54,7 @@ export class SurfaceStage<Surface extends StagedSurface> {
   /** A frame begins; a delta that belongs to another frame than the one on the screen is left aside. */
   begin(layout: SurfaceLayout, key: boolean): void {
     if (!key) {
-      this.coming_ = this.front_ && sameLayout(this.front_.layout, layout) ? this.front_ : null;
+      this.coming_ = this.front_ && continues(this.front_.layout, layout) ? this.front_ : null;
       return;
     }
     if (this.whole_) this.coming_ = this.back_ = this.madeFor(this.back_, layout);

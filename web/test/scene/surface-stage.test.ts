@@ -95,7 +95,8 @@ test("frames of a drag whose counts differ take turns in two sets of buffers, wh
 test("a delta goes to the frame on the screen, and to no other one", () => {
   const { stage, made, frame } = bench();
   frame(300, true);
-  stage.begin(layoutOf(300), false);
+  // Deltas have no radii.
+  stage.begin(layoutOf(300, { hasRadius: false }), false);
   expect(stage.put(blockOf(1))).toBe(true);
   stage.end(false);
   expect(made[0]?.blocks).toEqual([0, 1, 2, 1]);
