@@ -41,17 +41,17 @@ test("what opens a session stays within 200 kB of scripts, compressed; rarely us
   };
   visit(entry);
   visit(editor[0]);
-  const bytes = [...first].reduce(
-    (sum, name) => sum + gzipSync(entries.get(name), { level: 9 }).length,
-    0,
-  );
+  const bytes = [...first].reduce((sum, name) => sum + gzipSync(entries.get(name), { level: 9 }).length, 0);
   assert.ok(bytes <= scriptBudget, `${bytes} bytes`);
   for (const part of ["home-", "image-form-", "model-form-", "shortcut-sheet-"]) {
     const [name] = [...later].filter((each) => each.startsWith(part));
     assert.ok(name && !first.has(name), `${part}*.js is asked for when it is wanted`);
   }
   // Nothing lies about that no page asks for.
-  assert.deepEqual([...entries.keys()].filter((name) => !first.has(name) && !later.has(name)), []);
+  assert.deepEqual(
+    [...entries.keys()].filter((name) => !first.has(name) && !later.has(name)),
+    [],
+  );
 });
 
 test("the page has no inline script or style and no address that a sub-path would break", () => {

@@ -53,7 +53,10 @@ test("a pull with resampling: more samples in the preview and after it, undone a
 
   const bound = page.getByLabel("Bound", { exact: true });
   await bound.fill("1");
-  assert.match(await page.locator('[data-part="resampling"] .obstacle').first().textContent(), /1\.05 and 16/);
+  assert.match(
+    await page.locator('[data-part="resampling"] .obstacle').first().textContent(),
+    /1\.05 and 16/,
+  );
   await bound.fill("1.4");
   await page.getByLabel("Move by X").fill("1.6");
   await page.waitForFunction(
@@ -74,8 +77,7 @@ test("a pull with resampling: more samples in the preview and after it, undone a
   // Another pull before it: a frame with another count follows.
   await page.getByLabel("Move by X").fill("0.8");
   await page.waitForFunction(
-    (before) =>
-      globalThis.pointwright.status.loadedSamples !== before && globalThis.pointwright.status.idle,
+    (before) => globalThis.pointwright.status.loadedSamples !== before && globalThis.pointwright.status.idle,
     previewed,
     { timeout: waitMs },
   );
