@@ -38,10 +38,11 @@ void check_shapes(const MultiresSurface& surface, const EditPlan& plan, const Ed
 
 // The entries of a detail column that do not fill a block, padded.
 struct LastBlock {
-  std::size_t first;
+  std::size_t first = 0;
   std::array<float, kSimdBlock> rest{};
   std::array<float, kSimdBlock> now{};
 
+  LastBlock() = default;
   explicit LastBlock(const std::vector<float>& detail) : first(detail.size() / kSimdBlock * kSimdBlock) {
     std::copy(detail.begin() + static_cast<std::ptrdiff_t>(first), detail.end(), rest.begin());
     now = rest;  // where the block does not move
@@ -135,7 +136,7 @@ void apply_edit(const MultiresSurface& surface, const EditPlan& plan, const Edit
   for (std::size_t k = plan.level(); k < surface.levels.size(); ++k) {
     const bool finest = k == surface.band_count();
     const bool carries = k > plan.level();
-    LastBlock last(finest ? std::vector<float>{} : surface.detail[k]);
+    LastBlock last = finest ? LastBlock() : LastBlock(surface.detail[k]);
     for (const bool bends : {true, false}) {
       const std::vector<std::uint32_t>& blocks = bends ? plan.bending() : plan.rigid();
       const RaiseArgs raise =

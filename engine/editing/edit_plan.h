@@ -23,9 +23,9 @@ struct BlockRange {
 /// field that it was made of must outlive it and stay as they were.
 class EditPlan {
  public:
-  /// `range`: the blocks that the plan moves, the others stay. A plan of a range and one of the rest, one after
-  /// the other, make the bits of one plan of all, where no sample of the first range has a neighbour in the
-  /// second.
+  /// `range`: the blocks that the plan moves, the others stay. A plan of a range and one of the rest, one
+  /// after the other, make the bits of one plan of all, where no sample of the first range has a neighbour
+  /// in the second.
   /// Of `params`, the level, the kinds of deformation and whether there are gains count, not their amounts.
   /// Cost:    O(N k) for each level finer than params.level, parallel; there 4 k + 16 bytes a sample that may
   ///          bend

@@ -14,8 +14,8 @@ inline constexpr double kGreatestMinSpacing = 1e9;
 inline constexpr std::uint32_t kMaxRelaxationSweeps = 64;
 inline constexpr double kGreatestCollectDistance = 0.9;
 
-/// An edit's dynamic resampling. A sample is split along a principal axis of its cell where the axis has grown
-/// to `bound` of the sample's own spacing and to `min_spacing`.
+/// An edit's dynamic resampling. A sample is split along a principal axis of its cell where the axis has
+/// grown to `bound` of the sample's own spacing and to `min_spacing`.
 struct ResamplingParams {
   double bound = 1.5;        ///< in [1.05, 16], of the spacing that the sample has at rest
   double min_spacing = 0.0;  ///< model units, >= 0: axes shorter than this are not split

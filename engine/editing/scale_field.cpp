@@ -7,6 +7,7 @@
 #include "engine/core/check.h"
 #include "engine/core/parallel.h"
 #include "engine/editing/scale_field_kernels.h"
+#include "engine/editing/scale_field_range.h"
 
 namespace pointwright {
 
@@ -85,32 +86,41 @@ void (*blend_kernel(Blend blend))(const ScaleBlend&, std::size_t) {
 
 }  // namespace
 
-ScaleField compute_scale_field(const Points& position, const RegionPair& regions, Blend blend,
-                               const ExecutionContext* context) {
-  POINTWRIGHT_CHECK(!regions.zero.empty() && !regions.one.empty(), "both regions hold a ball");
-  const std::size_t n = position.size();
-  ScaleField field{.t = std::vector<float>(padded_to_block(n)), .gradient = Points(n)};
-  const auto blend_block = blend_kernel(blend);
-  parallel_for(
-      n,
-      [&](std::size_t begin, std::size_t end) {
-        RegionDistances zero;
-        RegionDistances one;
-        region_distances(regions, position, begin, end, zero, one);
-        blend_block(ScaleBlend{.zero = columns_of(zero),
-                               .one = columns_of(one),
-                               .t = field.t.data() + begin,
-                               .gradient_x = field.gradient.x() + begin,
-                               .gradient_y = field.gradient.y() + begin,
-                               .gradient_z = field.gradient.z() + begin},
-                    padded_to_block(end - begin));
-      },
-      kParallelBlock, context);
-  // The padding belongs to no sample: it stays put.
-  for (std::size_t i = n; i < field.t.size(); ++i) {
+void compute_scale_range(const Points& position, const RegionPair& regions, Blend blend, std::size_t begin,
+                         std::size_t end, DistancePair& distances, ScaleField& field) {
+  region_distances(regions, position, begin, end, distances.zero, distances.one);
+  blend_kernel(blend)(ScaleBlend{.zero = columns_of(distances.zero),
+                                 .one = columns_of(distances.one),
+                                 .t = field.t.data() + begin,
+                                 .gradient_x = field.gradient.x() + begin,
+                                 .gradient_y = field.gradient.y() + begin,
+                                 .gradient_z = field.gradient.z() + begin},
+                      padded_to_block(end - begin));
+}
+
+ScaleField unfilled_scale_field(std::size_t n) {
+  return {.t = std::vector<float>(padded_to_block(n)), .gradient = Points(n)};
+}
+
+void clear_padding(ScaleField& field) {
+  for (std::size_t i = field.size(); i < field.t.size(); ++i) {
     field.t[i] = 0.0F;
     for (float* column : {field.gradient.x(), field.gradient.y(), field.gradient.z()}) column[i] = 0.0F;
   }
+}
+
+ScaleField compute_scale_field(const Points& position, const RegionPair& regions, Blend blend,
+                               const ExecutionContext* context) {
+  POINTWRIGHT_CHECK(!regions.zero.empty() && !regions.one.empty(), "both regions hold a ball");
+  ScaleField field = unfilled_scale_field(position.size());
+  parallel_for(
+      position.size(),
+      [&](std::size_t begin, std::size_t end) {
+        DistancePair distances;
+        compute_scale_range(position, regions, blend, begin, end, distances, field);
+      },
+      kParallelBlock, context);
+  clear_padding(field);
   return field;
 }
 

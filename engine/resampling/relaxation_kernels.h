@@ -1,5 +1,6 @@
 #pragma once
-// Who is near whom among inserted samples, and how they push each other away (engine/resampling/relaxation.h).
+// Who is near whom among inserted samples, and how they push each other away
+// (engine/resampling/relaxation.h).
 
 #include <cstddef>
 #include <cstdint>

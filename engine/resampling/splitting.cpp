@@ -24,7 +24,8 @@ std::uint32_t parts(float length, float wanted, std::uint32_t most) {
   return std::clamp(rounded >= 1.0F ? static_cast<std::uint32_t>(rounded) : 1U, 1U, most);
 }
 
-// Where the minor axis is squeezed a stretch counts as major * minor^0.75: minor^0.75, of correctly rounded operations alone.
+// Where the minor axis is squeezed a stretch counts as major * minor^0.75: the latter, of correctly rounded
+// operations alone.
 float shear_factor(float minor) {
   const float root = std::sqrt(minor);
   return root * std::sqrt(root);

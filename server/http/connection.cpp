@@ -5,6 +5,7 @@
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@ namespace {
 constexpr std::size_t kLingerDropBytes = 256 * 1024;
 constexpr std::size_t kReadBytes = 64 * 1024;
 constexpr std::uint64_t kHoldBytes = 4U << 20U;
+constexpr std::size_t kMostPieces = 4;  // in one call
 
 int poll_timeout(Clock::time_point deadline) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
@@ -33,6 +35,16 @@ bool wait_for(int descriptor, short events, Clock::time_point deadline) {
     if (ready < 0 && errno != EINTR) return true;  // let the call itself report what is wrong
     if (Clock::now() >= deadline) return false;
   }
+}
+
+/// What is left of the pieces without their first `count` bytes.
+std::span<std::span<const std::byte>> past(std::span<std::span<const std::byte>> pieces, std::size_t count) {
+  while (!pieces.empty() && count >= pieces.front().size()) {
+    count -= pieces.front().size();
+    pieces = pieces.subspan(1);
+  }
+  if (!pieces.empty()) pieces.front() = pieces.front().subspan(count);
+  return pieces;
 }
 
 }  // namespace
@@ -117,12 +129,25 @@ Connection::BodyStatus Connection::read_body(std::uint64_t length, BodyPace pace
 }
 
 bool Connection::write_all(std::span<const std::byte> bytes, Clock::time_point deadline) {
-  while (!bytes.empty() && !broken_) {
-    const ssize_t count = ::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  return write_all(std::span(&bytes, 1), deadline);
+}
+
+bool Connection::write_all(std::span<std::span<const std::byte>> pieces, Clock::time_point deadline) {
+  for (pieces = past(pieces, 0); !pieces.empty() && !broken_;) {
+    std::array<iovec, kMostPieces> vectors{};
+    const std::size_t several = std::min(pieces.size(), kMostPieces);
+    for (std::size_t i = 0; i < several; ++i) {
+      // The kernel only reads through it.
+      vectors[i] = {.iov_base = const_cast<std::byte*>(pieces[i].data()), .iov_len = pieces[i].size()};
+    }
+    msghdr message{};
+    message.msg_iov = vectors.data();
+    message.msg_iovlen = several;
+    const ssize_t count = ::sendmsg(descriptor_, &message, MSG_NOSIGNAL);
     if (count >= 0) {
-      bytes = bytes.subspan(static_cast<std::size_t>(count));
+      pieces = past(pieces, static_cast<std::size_t>(count));
       // A reader that takes a byte at a time must not push the deadline ahead of itself.
-      if (!bytes.empty() && Clock::now() >= deadline) broken_ = true;
+      if (!pieces.empty() && Clock::now() >= deadline) broken_ = true;
       continue;
     }
     if (errno == EINTR) continue;

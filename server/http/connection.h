@@ -41,6 +41,8 @@ class Connection {
   /// broken.
   bool write_all(std::span<const std::byte> bytes, Clock::time_point deadline);
   bool write_all(std::string_view text, Clock::time_point deadline);
+  /// The same for a few pieces in a row, uncopied.
+  bool write_all(std::span<std::span<const std::byte>> pieces, Clock::time_point deadline);
 
   [[nodiscard]] bool is_broken() const { return broken_; }
   /// Whether the peer has closed or reset its side. Never blocks.

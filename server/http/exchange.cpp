@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cstdio>
 
 #include "server/base/random_id.h"
@@ -213,6 +214,18 @@ void Exchange::begin_answer(std::uint64_t bytes) {
 
 void Exchange::begin_stream_write() {
   write_deadline_ = Clock::now() + context_.options.stream_write_deadline;
+}
+
+bool Exchange::write_chunk(std::span<const std::byte> bytes) {
+  begin_stream_write();
+  std::array<char, 2 * sizeof(std::size_t) + 2> head{};
+  char* end = std::to_chars(head.data(), head.data() + head.size(), bytes.size(), 16).ptr;
+  *end++ = '\r';
+  *end++ = '\n';
+  constexpr std::string_view kEnd = "\r\n";
+  std::array pieces{std::as_bytes(std::span<const char>(head.data(), end)), bytes,
+                    std::as_bytes(std::span<const char>(kEnd))};
+  return connection_.write_all(std::span<std::span<const std::byte>>(pieces), write_deadline_);
 }
 
 void Exchange::finish() {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -41,6 +42,8 @@ class Exchange {
   /// Deadlines of what is written next.
   void begin_answer(std::uint64_t bytes);
   void begin_stream_write();
+  /// One chunk of a streamed body, uncopied. False: the peer is gone or too slow. Pre: not empty.
+  bool write_chunk(std::span<const std::byte> bytes);
   [[nodiscard]] Clock::time_point write_deadline() const { return write_deadline_; }
 
   [[nodiscard]] bool is_broken() const { return connection_.is_broken(); }

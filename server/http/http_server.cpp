@@ -104,19 +104,18 @@ class ConnectionThreads final : public httplib::TaskQueue {
   std::condition_variable all_done_;
 };
 
-class LibrarySink final : public BodySink {
+/// Writes the chunks of a streamed body past the library, which would copy them twice; it has written the
+/// head before, keeps nothing back, and writes the closing chunk.
+class ChunkSink final : public BodySink {
  public:
-  LibrarySink(httplib::DataSink& sink, Exchange& exchange) : sink_(sink), exchange_(exchange) {}
+  explicit ChunkSink(Exchange& exchange) : exchange_(exchange) {}
   bool write(std::span<const std::byte> bytes) override {
-    if (bytes.empty()) return true;
-    exchange_.begin_stream_write();
-    return sink_.write(reinterpret_cast<const char*>(bytes.data()), bytes.size()) && !exchange_.is_broken();
+    return bytes.empty() || exchange_.write_chunk(bytes);
   }
   [[nodiscard]] bool is_peer_gone() override { return exchange_.is_peer_gone(); }
   [[nodiscard]] bool is_stopping() const override { return exchange_.is_stopping(); }
 
  private:
-  httplib::DataSink& sink_;
   Exchange& exchange_;
 };
 
@@ -146,7 +145,7 @@ void fill(httplib::Response& out, Response response, Exchange& exchange) {
                                      [body = std::move(*stream), &exchange](size_t, httplib::DataSink& sink) {
                                        // An exception that left a provider would end the process.
                                        try {
-                                         LibrarySink target(sink, exchange);
+                                         ChunkSink target(exchange);
                                          body(target);
                                        } catch (const std::exception& error) {
                                          exchange.note_failure(error.what());

@@ -8,6 +8,10 @@ namespace {
 
 /// Frames of one picture that are kept: viewers mostly ask for the same delta, newcomers for the key.
 constexpr std::size_t kKeptFrames = 3;
+/// Frames that no viewer reads any more and whose memory the next one takes.
+constexpr std::size_t kUnusedFrames = 1;
+/// How many times more memory than it needs a frame may hold on to.
+constexpr std::size_t kMostSlack = 4;
 
 protocol::FrameState frame_state(const Picture& picture, std::uint32_t level) {
   return {.level = static_cast<std::uint8_t>(level),
@@ -53,6 +57,8 @@ SharedFrame encode_picture(const Picture& picture, std::uint32_t level, std::uin
                    *bytes);
   return bytes;
 }
+
+Display::Display() : unused_(kUnusedFrames) {}
 
 std::shared_ptr<Display::Shown> Display::shown() const {
   const std::lock_guard lock(mutex_);
@@ -116,7 +122,8 @@ Display::Frame Display::frame_since(std::uint64_t version, std::uint16_t attribu
   auto state = frame_state(now->picture, level);
   state.bounds = now->bounds;
   const auto columns = frame_columns(now->picture, level);
-  auto bytes = std::make_shared<protocol::FrameBytes>();
+  auto bytes = unused_.take();
+  if (bytes == nullptr) bytes = std::make_unique<protocol::FrameBytes>();
   if (since == 0) {
     encode_key_frame(now->layout, columns, state, attributes, *bytes);
   } else {
@@ -125,8 +132,10 @@ Display::Frame Display::frame_since(std::uint64_t version, std::uint16_t attribu
       if (now->block_versions[block] > since) blocks.push_back(block);
     encode_delta_frame(now->layout, columns, state, attributes, blocks, *bytes);
   }
+  if (bytes->capacity() > kMostSlack * bytes->size()) bytes->shrink_to_fit();
   if (frames.size() == kKeptFrames) frames.pop_back();
-  frames.insert(frames.begin(), {.since = since, .attributes = attributes, .bytes = std::move(bytes)});
+  frames.insert(frames.begin(),
+                {.since = since, .attributes = attributes, .bytes = unused_.share(std::move(bytes))});
   return {frames.front().bytes, now->version};
 }
 

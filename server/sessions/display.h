@@ -10,6 +10,7 @@
 #include "engine/multires/surface.h"
 #include "protocol/frames/frame.h"
 #include "protocol/frames/layout.h"
+#include "server/base/recycler.h"
 #include "server/sessions/sample_set.h"
 
 namespace pointwright::server {
@@ -30,6 +31,8 @@ using SharedFrame = std::shared_ptr<const protocol::FrameBytes>;
 /// Publishes pictures and encodes frames between them. Thread-safe.
 class Display {
  public:
+  Display();
+
   /// Shows another picture: one writer at a time. Cost: O(N).
   void publish(Picture picture);
 
@@ -65,6 +68,7 @@ class Display {
   };
   [[nodiscard]] std::shared_ptr<Shown> shown() const;
 
+  Recycler<protocol::FrameBytes> unused_;
   mutable std::mutex mutex_;  // guards shown_
   std::shared_ptr<Shown> shown_;
 };

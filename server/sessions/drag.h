@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "engine/editing/edit_plan.h"
+#include "server/base/recycler.h"
 #include "server/sessions/surface_state.h"
 
 namespace pointwright::server {
@@ -16,7 +17,6 @@ class Drag {
   /// Cost: that of an EditPlan
   Drag(const RestModel& rest, SurfaceState state, std::shared_ptr<const ScaleField> field,
        const EditParams& params);
-  ~Drag();
   Drag(const Drag&) = delete;
   Drag& operator=(const Drag&) = delete;
 
@@ -28,13 +28,12 @@ class Drag {
   [[nodiscard]] std::shared_ptr<const MultiresSurface> frame(const EditParams& params);
 
  private:
-  struct Free;
-
   const Vec3d origin_;
   const SurfaceState state_;
   const std::shared_ptr<const ScaleField> field_;
   const EditPlan plan_;
-  std::shared_ptr<Free> free_;
+  // Surfaces that nobody looks at any more, equal to the drag's but for what moves.
+  Recycler<MultiresSurface> free_;
 };
 
 }  // namespace pointwright::server

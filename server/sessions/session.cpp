@@ -254,12 +254,25 @@ Outcome<RegionField> Session::ensure_field(std::uint32_t level, Blend blend) {
   active_level_ = level;
   if (field_key_ != key) {
     const auto begin = SteadyClock::now();
-    auto field = field_of(now->surface, level, blend, *now->marks);
+    const Points& position = now->surface.surface->levels[level].position;
+    const Sampling& sampling = *now->surface.samples->sampling;
+    FieldKey before = last_field_ ? last_field_->first : FieldKey{};
+    before.marks = now->marks;
+    if (before != key) last_field_.reset();
+    // After a stroke most samples keep their t.
+    auto painted = last_field_
+                       ? last_field_->second.repainted(position, sampling.spacing, *now->marks, rest_.origin)
+                       : PaintedField::make(position, sampling.spacing, *now->marks, rest_.origin, blend);
     note_time("field", begin);
+    if (painted) last_field_.emplace(key, painted.value());
     const std::lock_guard lock(field_mutex_);
     field_key_ = key;
-    field_ = field.ok() ? field.value() : RegionField{};
-    field_problem_ = field.ok() ? std::nullopt : std::optional<Problem>(protocol::to_problem(field.error()));
+    field_ = {};
+    if (painted)
+      field_ = {.t = painted.value().field(),
+                .regions = std::make_shared<const RegionPair>(painted.value().regions()),
+                .samples = now->surface.samples};
+    field_problem_ = painted ? std::nullopt : std::optional<Problem>(protocol::to_problem(painted.error()));
   }
   shown_field_ = field_;
   if (field_problem_) return *field_problem_;

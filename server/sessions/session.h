@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "engine/editing/painted_field.h"
 #include "server/base/outcome.h"
 #include "server/sessions/display.h"
 #include "server/sessions/document.h"
@@ -70,7 +71,6 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<Committed> commit(const EditParams& params, Expected expected);
   /// Undo, redo, jump: keeps the first `edit` edits applied.
   Outcome<SharedDocument> move_head(std::size_t edit, Expected expected = {});
-
   /// The history as it stands, to go on from beside the session, and the document that it belongs to.
   struct Fork {
     SharedDocument document;
@@ -114,7 +114,6 @@ class Session : public std::enable_shared_from_this<Session> {
     Blend blend = Blend::kQuartic;
     friend bool operator==(const FieldKey&, const FieldKey&) = default;
   };
-
   Session(SessionParams params, SessionServices services);
   // Everything below runs on the strand, except where it says otherwise.
   void build();  // on the background pool
@@ -181,6 +180,7 @@ class Session : public std::enable_shared_from_this<Session> {
   };
   std::optional<LastPreview> last_preview_;
   EditDrag drag_;
+  std::optional<std::pair<FieldKey, PaintedField>> last_field_;  // that could be made
 
   mutable std::mutex field_mutex_;  // guards the next three, which only the strand writes
   std::optional<FieldKey> field_key_;

@@ -1,9 +1,11 @@
 // Painting, the scale field, and the edit of a drag's frame (DESIGN: paint.*; the parts of frame.*).
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 
 #include "engine/editing/ball_cover.h"
 #include "engine/editing/edit_plan.h"
+#include "engine/editing/painted_field.h"
 #include "engine/editing/painting.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/synthetic_scan.h"
@@ -66,11 +68,12 @@ void bench_size(BenchReport& report, const Size& size) {
   paint(half(1.0), RegionKind::kZero, painted_on, marks);
   paint(half(-1.0), RegionKind::kOne, painted_on, marks);
   const PaintOperation brush{.shape = brush_stroke(), .steal = true};
+  const PaintedField before =
+      PaintedField::make(base.position, spacing, marks, origin, Blend::kQuartic).value();
   report.time(name("paint"), "ms", items, [&] {
     Marks painted = marks;
     paint(brush, RegionKind::kOne, painted_on, painted);
-    const RegionPair regions = regions_from_marks(base.position, spacing, painted, origin).value();
-    compute_scale_field(base.position, regions, Blend::kQuartic);
+    if (!before.repainted(base.position, spacing, painted, origin)) std::abort();
   });
 
   const RegionPair regions = regions_from_marks(base.position, spacing, marks, origin).value();

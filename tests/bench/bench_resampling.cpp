@@ -3,7 +3,8 @@
 #include <string>
 
 #include "engine/multires/hierarchy.h"
-#include "engine/resampling/resampled_edit.h"
+#include "engine/resampling/resampled_drag.h"
+#include "protocol/frames/frame.h"
 #include "tests/bench/benchmarks.h"
 #include "tests/bench/synthetic_scan.h"
 #include "tests/support/pulled_plane.h"
@@ -44,12 +45,20 @@ void bench_preview(BenchReport& report, const std::string& name, std::size_t n) 
   const auto sampling = std::make_shared<const Sampling>(
       rest_sampling(std::make_shared<const Cloud>(scan),
                     std::make_shared<const NeighborGraph>(std::move(hierarchy.graph)), hierarchy.spacing));
+  ResampledDrag drag(std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)), sampling, params,
+                     std::make_shared<const ScaleField>(field), regions.value());
+  protocol::FrameBytes bytes;
+  MultiresSurface room;
   std::size_t inserted = 0;
   report.time(name, "ms", static_cast<double>(n), [&] {
-    const auto frame = apply_resampled_edit(hierarchy.surface, sampling, params, field, regions.value(),
-                                            ResamplingEffort::kPreview);
+    auto frame = drag.frame(params, ResamplingEffort::kPreview, std::move(room));
     if (!frame) std::abort();
+    room = std::move(frame.value().surface);
     inserted = frame.value().inserted;
+    const Level& shown = room.finest();
+    encode_key_frame(protocol::FrameLayout(static_cast<std::uint32_t>(shown.position.size())),
+                     {.position = &shown.position, .normal = &shown.normal},
+                     protocol::FrameState{.origin = scan.origin}, protocol::kFrameNormal, bytes);
   });
   report.add(name + ".inserted", "samples", static_cast<double>(n), static_cast<double>(inserted));
 }

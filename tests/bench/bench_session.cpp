@@ -24,16 +24,32 @@ double resident_bytes() {
 
 void bench_scan(BenchReport& report, const std::string& label, std::size_t n) {
   const std::string decode = "draco.decode." + label;
+  const std::string shuffled = decode + ".random";
   const std::string session = "session." + label;
-  if (!report.wants(decode) && !report.wants(session)) return;
-  auto encoded = write_cloud(ordered_scan(n), CloudFormat::kDraco, ExportParams{.draco_position_bits = 14});
-  if (!encoded) std::abort();
+  if (!report.wants(shuffled) && !report.wants(session)) return;
+  const Cloud scan = ordered_scan(n);
   const ImportParams params{};
-  report.time(decode, "ms", static_cast<double>(n), [&] {
-    if (!read_cloud(encoded.value(), CloudFormat::kDraco, params)) std::abort();
-  });
+  const auto written = [&](bool caller_order) {
+    auto bytes = write_cloud(scan, CloudFormat::kDraco,
+                             ExportParams{.caller_order = caller_order, .draco_position_bits = 14});
+    if (!bytes) std::abort();
+    return std::move(bytes).value();
+  };
+  // The caller's order is random. Whichever it is, the cloud is put in order as it is read.
+  const std::vector<std::byte> random_order = written(true);
+  const auto time_decoding = [&](const std::string& name, const std::vector<std::byte>& bytes) {
+    report.time(name, "ms", static_cast<double>(n), [&] {
+      if (!read_cloud(bytes, CloudFormat::kDraco, params)) std::abort();
+    });
+    report.add(name + ".bytes_per_sample", "B", static_cast<double>(n),
+               static_cast<double>(bytes.size()) / static_cast<double>(n));
+  };
+  if (report.wants(shuffled)) {
+    time_decoding(decode, written(false));
+    time_decoding(shuffled, random_order);
+  }
   const auto open = [&] {
-    auto imported = read_cloud(encoded.value(), CloudFormat::kDraco, params);
+    auto imported = read_cloud(random_order, CloudFormat::kDraco, params);
     if (!imported) std::abort();
     auto hierarchy =
         build_hierarchy(imported.value().cloud, HierarchyParams{.scales = kThreeScales}, ExecutionContext{});

@@ -95,6 +95,22 @@ TEST_CASE("quantised positions lie within half a step of the true ones") {
   }
 }
 
+TEST_CASE("quantised positions are entropy-coded where that saves much, and plain where it hardly does") {
+  constexpr std::size_t kSamples = 20'000;
+  constexpr std::size_t kPlainBytes = kSamples * 3 * 2;  // 14 bits in two whole bytes
+  const Cloud cloud = sphere(kSamples).cloud;            // the caller's order is random
+  const auto written = [&](bool caller_order) {
+    return write_cloud(cloud, CloudFormat::kDraco, {.caller_order = caller_order, .draco_position_bits = 14})
+        .value();
+  };
+  const auto shuffled = written(true);
+  const auto ordered = written(false);
+  CHECK(shuffled.size() > kPlainBytes);
+  CHECK(shuffled.size() < kPlainBytes + 100);
+  CHECK(ordered.size() < kPlainBytes * 5 / 6);
+  CHECK(read(shuffled).cloud.position == read(ordered).cloud.position);
+}
+
 TEST_CASE("integers at the ends of their types survive, alone and together") {
   for (const std::size_t count : {1U, 2U, 5U}) {
     const Cloud cloud = cloud_with_everything(count, Place::kNearZero, count).cloud;

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <ctime>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 
 #include "engine/core/parallel.h"
 #include "engine/resampling/resampled_edit.h"
@@ -15,10 +15,9 @@
 namespace pointwright {
 namespace {
 
-ResampledEdit resampled(const test::PulledPlane& scene,
-                        ResamplingEffort effort = ResamplingEffort::kExact) {
-  auto result = apply_resampled_edit(scene.surface, scene.sampling, scene.params, scene.field, scene.regions,
-                                     effort);
+ResampledEdit resampled(const test::PulledPlane& scene, ResamplingEffort effort = ResamplingEffort::kExact) {
+  auto result =
+      apply_resampled_edit(scene.surface, scene.sampling, scene.params, scene.field, scene.regions, effort);
   REQUIRE(result.ok());
   return std::move(result).value();
 }
@@ -65,20 +64,19 @@ Holes holes(const test::PulledPlane& scene, const ResampledEdit& edit, double un
     if (random.uniform() * static_cast<double>(most) > static_cast<double>(area[i])) continue;
     list.push_back(rest[i] + Vec3f(0.0F, 0.0F, field.t[i] * static_cast<float>(test::PulledPlane::kHeight)));
   }
-  const std::vector<double> gap =
-      test::distances_to(test::from_list(list), edit.surface.levels[0].position);
+  const std::vector<double> gap = test::distances_to(test::from_list(list), edit.surface.levels[0].position);
   return {.p999 = gap[gap.size() * 999 / 1000] / unit, .most = gap.back() / unit};
 }
 
 TEST_CASE("a plane pulled up has the counts of Figure 7") {
   const char* sw = std::getenv("SW");
   for (const std::size_t side : {100UL}) {
-    test::PulledPlane scene = test::pulled_plane(side); if (sw) scene.params.resampling->sweeps = (unsigned)atoi(sw);
+    test::PulledPlane scene = test::pulled_plane(side);
+    if (sw) scene.params.resampling->sweeps = (unsigned)atoi(sw);
     for (int repeat = 0; repeat < 1; ++repeat) {
       const auto begin = std::clock();
       const ResampledEdit edit = resampled(scene);
-      const double ms =
-          1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+      const double ms = 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
       MESSAGE("side " << side << ": " << edit.sampling->size() << " samples in " << ms << " ms");
     }
     const ResampledEdit edit = resampled(scene);
@@ -86,8 +84,9 @@ TEST_CASE("a plane pulled up has the counts of Figure 7") {
     const test::Spacing spacing = test::spacing_of(test::coherent(stretched_part(scene, edit)), wanted);
     const std::vector<double> all = test::nearest_distances(test::coherent(stretched_part(scene, edit)));
     const Holes disc = holes(scene, edit, wanted);
-    MESSAGE("NN min " << spacing.least << " mean " << spacing.mean << " cv " << spacing.variation << " max/mean "
-                      << all.back() / wanted / spacing.mean << " disc " << disc.p999 << " / " << disc.most);
+    MESSAGE("NN min " << spacing.least << " mean " << spacing.mean << " cv " << spacing.variation
+                      << " max/mean " << all.back() / wanted / spacing.mean << " disc " << disc.p999 << " / "
+                      << disc.most);
     double square = 0.0;
     double worst = 0.0;
     std::size_t off = 0;
@@ -95,7 +94,8 @@ TEST_CASE("a plane pulled up has the counts of Figure 7") {
     const Points& p = edit.surface.levels[0].position;
     for (std::size_t i = before; i < edit.sampling->size(); ++i) {
       const auto& uv = edit.sampling->cloud->texcoord[i];
-      const double error = std::hypot(static_cast<double>(uv[0] - p[i].x()), static_cast<double>(uv[1] - p[i].y()));
+      const double error =
+          std::hypot(static_cast<double>(uv[0] - p[i].x()), static_cast<double>(uv[1] - p[i].y()));
       square += error * error;
       worst = std::max(worst, error);
     }

@@ -55,7 +55,7 @@ class RawClient {
   bool receive_some(std::string& text, std::chrono::milliseconds patience) {
     pollfd entry{.fd = socket_, .events = POLLIN, .revents = 0};
     if (::poll(&entry, 1, static_cast<int>(patience.count())) <= 0) return false;
-    char buffer[16384];
+    char buffer[65536];
     const ssize_t count = ::recv(socket_, buffer, sizeof buffer, 0);
     if (count <= 0) return false;
     text.append(buffer, static_cast<std::size_t>(count));

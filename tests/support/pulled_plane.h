@@ -83,8 +83,8 @@ inline PulledPlane pulled_plane(std::size_t side, const std::function<double(dou
                   .resampling = ResamplingParams{.min_spacing = PulledPlane::kMinSpacing}};
   scene.field = compute_scale_field(level.position, scene.regions, scene.params.blend);
   scene.sampling = std::make_shared<const pointwright::Sampling>(rest_sampling(
-      std::make_shared<const Cloud>(std::move(cloud)), std::make_shared<const NeighborGraph>(std::move(graph)),
-      std::vector<float>(n, static_cast<float>(h))));
+      std::make_shared<const Cloud>(std::move(cloud)),
+      std::make_shared<const NeighborGraph>(std::move(graph)), std::vector<float>(n, static_cast<float>(h))));
   return scene;
 }
 

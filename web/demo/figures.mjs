@@ -1,9 +1,10 @@
-// Two figures of the paper, made through the public HTTP API and the real viewer: the elementary deformations of Figure 5, and
-// the embossed plate of Figure 10 that is lifted on one resolution and on several. `make figures` builds what it needs and runs it.
+// Figures of the paper, made through the public HTTP API and the real viewer: the elementary deformations of Figure 5, the
+// pulled plane of Figure 7, and the embossed plate of Figure 10 that is lifted on one resolution and on several. `make figures` builds what it needs and runs it.
 import { mkdirSync, rmSync } from "node:fs";
 import { resolve } from "node:path";
 import { launchBrowser } from "../scripts/browser.mjs";
 import { call, here, openSession, root, step, takePicture, upload } from "./api.mjs";
+import { averaged } from "./averaged.mjs";
 import { putTogether } from "./beside.mjs";
 import { startDaemon } from "./daemon.mjs";
 import { checkerboard, plate } from "./plate.mjs";
@@ -74,6 +75,40 @@ async function elementaryDeformations(url) {
   }
   const figure = resolve(out, "figure-5.jpg");
   await putTogether(rows, aspect, figure);
+  return here(figure);
+}
+
+/** Pulls the middle of a checkered plane up: holes without resampling; with it, crisp, and blurred as the paper's caption says. */
+async function pulledPlane(url) {
+  const samples = 100 * 100;
+  const cloud = await upload(url, "Plane", ply, plate(100, { colour: checkerboard(16) }));
+  const session = await openSession(url, { cloud: cloud.id, name: "Figure 7", scales: [0.02] });
+  const circle = (radius) => add({ type: "sphere", center: [0, 0, 0], radius });
+  await put(url, session, "zero", [circle(0.9), { mode: "invert" }]);
+  await put(url, session, "one", [circle(0.1)]);
+  const camera = { position: [0.9, -3.4, 2.3], target: [0, 0, 0.62], up: [0, 0, 1] };
+  const file = (name) => resolve(out, `${name}.png`);
+  const picture = (id, name) => takePicture(url, id, file(name), { camera, mode: "color", size });
+  const clear = async () => {
+    for (const region of ["zero", "one"]) await put(url, session, region, []); // their tint would hide the colours
+  };
+  const pull = { level: 0, deformation: { type: "translation", vector: [0, 0, 1.9] } };
+  await commit(url, session, pull);
+  await clear();
+  await picture(session.id, "stretched");
+  await undoAll(url, session);
+  await put(url, session, "zero", [circle(0.9), { mode: "invert" }]);
+  await put(url, session, "one", [circle(0.1)]);
+  await commit(url, session, { ...pull, resampling: {} });
+  await clear();
+  await picture(session.id, "resampled");
+  const file7 = await call(url, "GET", `${session.path}/samples?format=ply`);
+  const blurred = averaged(new Uint8Array(await file7.arrayBuffer()), samples, 10);
+  const other = await upload(url, "Averaged", ply, blurred);
+  const shown = await openSession(url, { cloud: other.id, name: "Figure 7, averaged", scales: [0.02] });
+  await picture(shown.id, "averaged");
+  const figure = resolve(out, "figure-7.jpg");
+  await putTogether([["stretched", "resampled", "averaged"].map(file)], aspect, figure);
   return here(figure);
 }
 
@@ -154,7 +189,7 @@ for (const signal of ["SIGINT", "SIGTERM"])
   process.once(signal, () => daemon.stop().then(() => process.exit(130)));
 try {
   const wanted = process.argv.slice(2); // numbers of figures; none: all
-  const figures = { 5: elementaryDeformations, 10: embossedPlate };
+  const figures = { 5: elementaryDeformations, 7: pulledPlane, 10: embossedPlate };
   for (const [number, make] of Object.entries(figures))
     if (wanted.length === 0 || wanted.includes(number))
       await step(`Figure ${number}`, () => make(daemon.url));

@@ -7,8 +7,8 @@ const readers = {
   float: ["getFloat32", 4], float32: ["getFloat32", 4], double: ["getFloat64", 8], float64: ["getFloat64", 8],
 };
 
-/** Answers {count, positions: Float64Array(3 * count)}: float32 coordinates are exact in it. */
-export function readPly(bytes) {
+/** Where the vertices of a file stand: {count, start, stride, columns, view}. */
+export function openPly(bytes) {
   const end = "end_header\n";
   const headerLength =
     Buffer.from(bytes.buffer, bytes.byteOffset, Math.min(bytes.length, 65536)).indexOf(end) + end.length;
@@ -34,6 +34,12 @@ export function readPly(bytes) {
   if (bytes.length < headerLength + count * stride) throw new Error("the PLY file is cut short");
 
   const view = new DataView(bytes.buffer, bytes.byteOffset + headerLength);
+  return { count, start: headerLength, stride, columns, view };
+}
+
+/** Answers {count, positions: Float64Array(3 * count)}: float32 coordinates are exact in it. */
+export function readPly(bytes) {
+  const { count, stride, columns, view } = openPly(bytes);
   const xyz = ["x", "y", "z"].map((property) => columns.get(property));
   if (xyz.includes(undefined)) throw new Error("the PLY file has no x, y, z");
   const positions = new Float64Array(3 * count);
