@@ -101,11 +101,17 @@ test("an automatic audit finds nothing serious on the pages", { timeout }, async
   await editor.page.keyboard.press("w");
   for (const name of ["Shape by numbers", "Regions from an image", "Regions from another model"])
     await editor.page.locator("summary", { hasText: name }).click();
+  await editor.page.getByText("Choose a PNG").waitFor();
+  await editor.page.getByText("Apply model").waitFor();
   await editor.page.locator('[data-region="one"] [aria-controls]').click();
   assert.deepEqual(await seriousFindings(editor.page), []);
   await editor.page.locator("canvas.viewport-canvas").focus();
   await editor.page.keyboard.press("g");
   await editor.page.locator("summary", { hasText: "Playback and recipe" }).click();
+  await editor.page.getByLabel("Resample", { exact: true }).check();
+  await editor.page.locator("summary", { hasText: "Resampling" }).click();
+  await editor.page.getByLabel("Clean up afterwards").check();
+  await editor.page.getByLabel("Bound", { exact: true }).fill("99");
   assert.deepEqual(await seriousFindings(editor.page), []);
   await editor.page.locator("canvas.viewport-canvas").focus();
   await editor.page.keyboard.press("?");

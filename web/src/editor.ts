@@ -2,6 +2,7 @@ import type { ApiClient } from "./api/client";
 import type { SessionDocument } from "./api/types";
 import { CommandQueue } from "./command-queue";
 import { editorShortcuts } from "./editor-shortcuts";
+import { reportError } from "./edits/errors";
 import { HistoryEditor } from "./edits/history";
 import { PaintSettingsStore } from "./edits/paint-settings";
 import { Player } from "./edits/player";
@@ -28,12 +29,11 @@ import { createColourBar } from "./ui/colour-bar";
 import { createDisplayPanel, loadDisplay, saveDisplay } from "./ui/display-panel";
 import { h } from "./ui/dom";
 import { createHistoryPanel } from "./ui/history-panel";
-import { createImageForm } from "./ui/image-form";
-import { createModelForm } from "./ui/model-form";
+import { createLazyFold } from "./ui/lazy-fold";
 import { createPaintBar } from "./ui/paint-bar";
 import { createPlayback } from "./ui/playback";
 import { createRegionsPanel } from "./ui/regions-panel";
-import { createShortcutSheet, listen } from "./ui/shortcuts";
+import { listen } from "./ui/shortcuts";
 import { createStatusBar } from "./ui/status-bar";
 import { createToolbar } from "./ui/toolbar";
 import { createTopBar } from "./ui/top-bar";
@@ -150,8 +150,32 @@ export function createEditor(
     stepBrush,
     command: (region, command) => void regions.command(region, command, reach.value),
   });
-  const sheet = createShortcutSheet(shortcuts);
-  bus.function("shortcuts.show", () => sheet.show());
+  let sheet: Promise<{ show(): void }> | null = null;
+  bus.function("shortcuts.show", () => {
+    sheet ??= import("./ui/shortcut-sheet").then(({ createShortcutSheet }) => {
+      const made = createShortcutSheet(shortcuts);
+      root.append(made.element);
+      return made;
+    });
+    void sheet
+      .then((made) => made.show())
+      .catch((error: unknown) => {
+        sheet = null;
+        reportError(bus, error, "The shortcuts cannot be shown");
+      });
+  });
+  let dismissImage = (): boolean => false;
+  bus.function("image.dismiss", () => dismissImage());
+  const imageFold = createLazyFold(bus, "Regions from an image", async (holder) => {
+    const { createImageForm } = await import("./ui/image-form");
+    const form = createImageForm(bus, client, store, regions, viewport, holder);
+    dismissImage = form.dismiss;
+    return form.element;
+  });
+  const modelFold = createLazyFold(bus, "Regions from another model", async (holder) => {
+    const { createModelForm } = await import("./ui/model-form");
+    return createModelForm(bus, client, store, regions, holder);
+  });
   if (link.ui) listen(shortcuts);
   root.append(
     createTopBar(bus, client, store),
@@ -160,15 +184,7 @@ export function createEditor(
     h(
       "aside",
       { class: "side panel", aria: { label: "Properties" } },
-      createRegionsPanel(
-        bus,
-        store,
-        regions,
-        size.radius,
-        reach,
-        createImageForm(bus, client, store, regions, viewport),
-        createModelForm(bus, client, store, regions),
-      ),
+      createRegionsPanel(bus, store, regions, size.radius, reach, imageFold, modelFold),
       transformPanel.element,
       createDisplayPanel(bus, document, {
         settings: display,
@@ -187,7 +203,6 @@ export function createEditor(
     ),
     createColourBar(bus, display),
     createStatusBar(bus, store),
-    sheet.element,
   );
   bus.on("display.changed", (settings) => {
     viewport.setDisplay(settings);

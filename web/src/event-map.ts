@@ -1,5 +1,6 @@
 import type { Blend, ElementaryDeformation, History, Problem, SessionDocument } from "./api/types";
 import type { PaintSettings } from "./edits/paint-settings";
+import type { ResamplingChoice, ResamplingFault } from "./edits/resampling";
 import type { Vec3 } from "./math/vec3";
 import type { DisplaySettings } from "./scene/display";
 
@@ -16,6 +17,8 @@ export interface PreviewStatus {
    * looks ahead. `waiting`: the picture cannot, and waits for the server.
    */
   state: "none" | "preview" | "waiting" | "exact";
+  /** The server's frame has other samples than the committed state; recording relaxes them further. */
+  resampled: boolean;
   latencyMs: number;
   samplesPerSecond: number;
 }
@@ -42,6 +45,9 @@ export interface TransformState {
   blend: Blend;
   /** What multiplies each band's detail in the one-region; those of bands below the level do not count. */
   gains: readonly number[];
+  resampling: ResamplingChoice;
+  /** What the server refused of it. */
+  resamplingFault: ResamplingFault | null;
   /** Why no transform can be made now; null where it can. */
   obstacle: string | null;
 }
@@ -66,7 +72,9 @@ export interface Notices {
   "painting.history": { undo: boolean; redo: boolean };
   "display.changed": DisplaySettings;
   "detail.range": number;
-  "frame.applied": { sequence: number; revision: number; key: boolean };
+  /** The factor that no stretch of the frames exceeds; 0: nothing was resampled yet. */
+  "stretch.range": number;
+  "frame.applied": { sequence: number; revision: number; samples: number };
   "load.changed": LoadStatus;
   "preview.changed": PreviewStatus;
   "transform.changed": TransformState;

@@ -123,14 +123,16 @@ export class FrameSource {
         hasColor: hasAttribute(header, "color"),
         hasMarks: hasAttribute(header, "marks"),
         hasRadius: hasAttribute(header, "radius"),
+        stretchRange: header.stretchRange,
       },
       key,
     );
-    this.viewport_.setBounds(header.bounds.center, header.bounds.radius, header.stretchRange);
+    this.viewport_.setBounds(header.bounds.center, header.bounds.radius);
     if (this.last === null) this.onFirst_(header);
     if (this.last?.detailRange !== header.detailRange) this.bus_.fire("detail.range", header.detailRange);
+    if (this.last?.stretchRange !== header.stretchRange) this.bus_.fire("stretch.range", header.stretchRange);
     if (this.last === null) this.last = header;
-    if (key) this.tellLoad(header, false);
+    if (this.tellsOf(header)) this.tellLoad(header, false);
   }
 
   private frameBlock(block: FrameBlock, header: FrameHeader): void {
@@ -146,15 +148,20 @@ export class FrameSource {
       marks: block.marks,
       radius: block.radius,
     });
-    if (header.kind === "key" && performance.now() - this.told_ > TELL_MS) this.tellLoad(header, false);
+    if (this.tellsOf(header) && performance.now() - this.told_ > TELL_MS) this.tellLoad(header, false);
   }
 
   private frameEnd(header: FrameHeader): void {
     this.last = header;
-    const { sequence, revision } = header;
+    const { sequence, revision, sampleCount } = header;
+    this.viewport_.endFrame(revision, sequence !== 0);
     this.tellLoad(header, true);
-    this.viewport_.frameShown(revision);
-    this.bus_.fire("frame.applied", { sequence, revision, key: header.kind === "key" });
+    this.bus_.fire("frame.applied", { sequence, revision, samples: sampleCount });
+  }
+
+  /** Whether it is told how much has come: not of each frame of a drag, which the hand is ahead of anyway. */
+  private tellsOf(header: FrameHeader): boolean {
+    return header.kind === "key" && (header.sequence === 0 || !this.viewport_.whole);
   }
 
   private event(event: StreamEvent): void {
@@ -166,7 +173,7 @@ export class FrameSource {
   private tellLoad(header: FrameHeader, complete: boolean): void {
     this.told_ = performance.now();
     this.bus_.fire("load.changed", {
-      loaded: this.viewport_.loadedSamples,
+      loaded: this.viewport_.arrivedSamples,
       total: header.sampleCount,
       complete,
     });

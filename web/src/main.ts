@@ -7,7 +7,6 @@ import { installHook, type ViewerStatus } from "./hook";
 import { readLink } from "./link";
 import type { Vec3 } from "./math/vec3";
 import type { CameraState } from "./scene/camera-math";
-import { showHome } from "./ui/home";
 import { createProgress } from "./ui/progress";
 import { createToasts } from "./ui/toasts";
 
@@ -23,7 +22,14 @@ async function main(): Promise<void> {
   const bare: ViewerStatus = { state: "home", loadedSamples: 0, revision: 0, lastSequence: 0, idle: true };
   if (link.session === null) {
     installHook(() => bare, { get: () => NO_CAMERA, set: () => undefined });
-    await showHome(root, client);
+    try {
+      const { showHome } = await import("./ui/home");
+      await showHome(root, client);
+    } catch (error) {
+      const failure = createProgress();
+      root.append(failure.element);
+      failure.fail(problemOf(error));
+    }
     return;
   }
 

@@ -86,6 +86,8 @@ export type RecordedOperation = { readonly mode: string };
 export type Deformation = WithVectors<Schemas["Deformation"]>;
 export type ElementaryDeformation = WithVectors<Schemas["ElementaryDeformation"]>;
 export type Blend = Schemas["Blend"];
+/** Every member has a default. */
+export type Resampling = Schemas["Resampling"];
 export type EditBody = Omit<WithVectors<Schemas["Edit"]>, "blend" | "gains"> & {
   blend?: Blend;
   gains?: readonly number[];

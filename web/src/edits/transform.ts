@@ -17,6 +17,15 @@ import {
 } from "./deformation";
 import { reportChangedMeanwhile, reportError } from "./errors";
 import { PreviewSender } from "./preview";
+import {
+  faultOfProblem,
+  type KeptText,
+  loadResampling,
+  type ResamplingChoice,
+  type ResamplingFault,
+  resamplingOf,
+  saveResampling,
+} from "./resampling";
 import type { LookAhead } from "./residual";
 import {
   allSteps,
@@ -31,6 +40,10 @@ import {
   withStepChosen,
   withSwapped,
 } from "./steps";
+
+/** Nothing is previewed. */
+const NO_PREVIEW = { state: "none", resampled: false, latencyMs: 0, samplesPerSecond: 0 } as const;
+const KEPT: () => KeptText = () => sessionStorage;
 
 function obstacleOf(session: SessionDocument): string | null {
   if (session.state !== "ready") return "The session is still being prepared.";
@@ -59,6 +72,10 @@ export class TransformEditor {
   private level_ = 0;
   private blend_: Blend = "quartic";
   private gains_: number[];
+  private resampling_: ResamplingChoice;
+  private resamplingFault_: ResamplingFault | null = null;
+  /** Of the last frame that came whole. */
+  private frameSamples_: number;
   private committing_: number | null = null;
   /** The tool asks for a step that there is no room for. */
   private full_ = false;
@@ -75,6 +92,8 @@ export class TransformEditor {
     this.queue_ = queue;
     this.store_ = store;
     this.gains_ = store.document.levels.slice(1).map(() => 1);
+    this.resampling_ = loadResampling(store.id, KEPT);
+    this.frameSamples_ = store.document.sample_count;
     this.preview = new PreviewSender(
       {
         put: (deformation, sequence) => client.putPreview(store.id, this.body(deformation), sequence),
@@ -83,16 +102,15 @@ export class TransformEditor {
       {
         onLookAhead,
         onAhead: (covered) =>
-          bus.fire("preview.changed", {
-            state: covered ? "preview" : "waiting",
-            latencyMs: 0,
-            samplesPerSecond: 0,
-          }),
+          bus.fire("preview.changed", { ...NO_PREVIEW, state: covered ? "preview" : "waiting" }),
         onExact: (latencyMs) => {
-          const samplesPerSecond = latencyMs > 0 ? (store.document.sample_count / latencyMs) * 1000 : 0;
-          bus.fire("preview.changed", { state: "exact", latencyMs, samplesPerSecond });
+          const samplesPerSecond = latencyMs > 0 ? (this.frameSamples_ / latencyMs) * 1000 : 0;
+          const resampled = this.frameSamples_ !== store.document.sample_count;
+          bus.fire("preview.changed", { state: "exact", resampled, latencyMs, samplesPerSecond });
         },
-        onError: (error) => reportError(bus, error, "The preview was refused"),
+        onError: (error) => {
+          if (!this.takeFault(error)) reportError(bus, error, "The preview was refused");
+        },
       },
       Date.now(),
     );
@@ -100,7 +118,8 @@ export class TransformEditor {
     bus.function("edit.cancel", () => this.cancel());
     bus.function("edit.pending", () => this.pending);
     bus.on("session.changed", () => this.tell());
-    bus.on("frame.applied", ({ sequence, revision }) => {
+    bus.on("frame.applied", ({ sequence, revision, samples }) => {
+      this.frameSamples_ = samples;
       // The recorded edit's frame may come before the answer that says so.
       if (this.committing_ !== null && sequence === 0 && revision > this.committing_) this.settle();
       this.preview.frameShown(sequence);
@@ -119,6 +138,8 @@ export class TransformEditor {
       level: this.level_,
       blend: this.blend_,
       gains: this.gains_,
+      resampling: this.resampling_,
+      resamplingFault: this.resamplingFault_,
       obstacle:
         obstacleOf(this.store_.document) ??
         (this.full_ ? `An edit has at most ${MAX_STEPS} steps. Choose one of them, or apply.` : null),
@@ -279,6 +300,21 @@ export class TransformEditor {
     this.again();
   }
 
+  /** Whether and where samples are inserted, for this edit and the next ones of this session. */
+  setResampling(change: Partial<ResamplingChoice>): void {
+    this.resampling_ = { ...this.resampling_, ...change };
+    this.resamplingFault_ = null;
+    saveResampling(this.store_.id, this.resampling_, KEPT);
+    this.again();
+  }
+
+  /** Keeps what of a refusal is about the resampling, to be told at its field; false where nothing is. */
+  private takeFault(error: unknown): boolean {
+    this.resamplingFault_ = faultOfProblem(problemOf(error));
+    this.tell();
+    return this.resamplingFault_ !== null;
+  }
+
   /** The same deformation under other conditions. */
   private again(): void {
     const whole = this.whole;
@@ -291,7 +327,7 @@ export class TransformEditor {
     this.clear();
     this.pivotEditing_ = false;
     this.tell();
-    this.bus_.fire("preview.changed", { state: "none", latencyMs: 0, samplesPerSecond: 0 });
+    this.bus_.fire("preview.changed", NO_PREVIEW);
     void this.preview
       .cancel()
       .catch((error: unknown) => reportError(this.bus_, error, "The preview could not be ended"));
@@ -322,6 +358,7 @@ export class TransformEditor {
 
   private async failed(error: unknown): Promise<void> {
     if (problemOf(error).status !== 412) {
+      this.takeFault(error);
       reportError(this.bus_, error, "The edit was not recorded");
       return;
     }
@@ -333,18 +370,25 @@ export class TransformEditor {
     this.steps_ = ONE_STEP;
     this.full_ = false;
     this.gains_ = this.gains_.map(() => 1);
+    this.resamplingFault_ = null;
   }
 
   private settle(): void {
     this.clear();
     this.preview.settle();
-    this.bus_.fire("preview.changed", { state: "none", latencyMs: 0, samplesPerSecond: 0 });
+    this.bus_.fire("preview.changed", NO_PREVIEW);
     this.tell();
   }
 
   private body(deformation: Deformation): EditBody {
-    const edit: EditBody = { level: this.level_, blend: this.blend_, deformation };
-    return this.changesDetail ? { ...edit, gains: this.gains_ } : edit;
+    const resampling = resamplingOf(this.resampling_);
+    return {
+      level: this.level_,
+      blend: this.blend_,
+      deformation,
+      ...(this.changesDetail && { gains: this.gains_ }),
+      ...(resampling && { resampling }),
+    };
   }
 
   private tell(): void {

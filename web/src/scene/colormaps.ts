@@ -1,5 +1,5 @@
 /** Colour maps as control points in sRGB (0..255), evenly spaced over 0..1. */
-export type ColormapName = "rainbow" | "viridis" | "coolwarm" | "purple-green";
+export type ColormapName = "rainbow" | "viridis" | "heat" | "coolwarm" | "purple-green";
 
 type Rgb = readonly [number, number, number];
 
@@ -26,6 +26,14 @@ const CONTROL_POINTS: Record<ColormapName, readonly Rgb[]> = {
     [92, 200, 99],
     [170, 220, 50],
     [253, 231, 37],
+  ],
+  // Stretch: pale where the surface is as it was, dark red where it is drawn out.
+  heat: [
+    [242, 238, 228],
+    [251, 213, 150],
+    [247, 160, 80],
+    [217, 86, 50],
+    [140, 20, 40],
   ],
   // Signed detail: blue below the base, white on it, red above.
   coolwarm: [

@@ -1,6 +1,6 @@
 import type { ColormapName } from "./colormaps";
 
-export type DisplayMode = "shaded" | "color" | "normals" | "t" | "detail";
+export type DisplayMode = "shaded" | "color" | "normals" | "t" | "detail" | "stretch";
 
 /** What the person chose to see. */
 export interface DisplaySettings {
@@ -25,11 +25,19 @@ export const DEFAULT_DISPLAY: DisplaySettings = {
 };
 
 /** The number that the shader knows a mode by. */
-export const MODE_NUMBERS: Record<DisplayMode, number> = { shaded: 0, color: 1, normals: 2, t: 3, detail: 4 };
+export const MODE_NUMBERS: Record<DisplayMode, number> = {
+  shaded: 0,
+  color: 1,
+  normals: 2,
+  t: 3,
+  detail: 4,
+  stretch: 5,
+};
 
 export function colormapOf(settings: DisplaySettings): ColormapName | null {
   if (settings.mode === "t") return settings.colorBlindSafe ? "viridis" : "rainbow";
   if (settings.mode === "detail") return settings.colorBlindSafe ? "purple-green" : "coolwarm";
+  if (settings.mode === "stretch") return settings.colorBlindSafe ? "viridis" : "heat";
   return null;
 }
 
@@ -37,8 +45,7 @@ export function colormapOf(settings: DisplaySettings): ColormapName | null {
 export function displayOfUrlMode(mode: string, base: DisplaySettings): DisplaySettings | null {
   if (mode === "regions") return { ...base, mode: "shaded", tintRegions: true };
   if (mode === "shaded") return { ...base, mode: "shaded", tintRegions: false };
-  if (mode === "color" || mode === "normals" || mode === "t" || mode === "detail") return { ...base, mode };
-  return null;
+  return Object.hasOwn(MODE_NUMBERS, mode) ? { ...base, mode: mode as DisplayMode } : null;
 }
 
 export function urlModeOf(settings: DisplaySettings): string {

@@ -163,6 +163,7 @@ export class Passes {
     setUniform(this.uniforms.splat, "blockTable", surface.blockTable);
     setUniform(this.uniforms.splat, "blockSize", surface.layout.blockSize);
     setUniform(this.uniforms.splat, "blockTableWidth", surface.blockTableWidth);
+    setUniform(this.uniforms.splat, "stretchRange", surface.layout.stretchRange);
   }
 
   setDisplay(display: DisplaySettings): void {

@@ -9,6 +9,7 @@ import {
   Sphere,
 } from "three";
 import { type LayerPrefix, layerPrefixes } from "./layers";
+import type { StagedSurface } from "./surface-stage";
 
 /** What the surface needs to know of a frame before its blocks come. */
 export interface SurfaceLayout {
@@ -21,6 +22,8 @@ export interface SurfaceLayout {
   hasColor: boolean;
   hasMarks: boolean;
   hasRadius: boolean;
+  /** Of the frame's stretches; 0 where it has none. */
+  stretchRange: number;
 }
 
 /** One block as the frame carries it: the arrays are uploaded as they are. */
@@ -62,22 +65,25 @@ const BLOCKS_PER_ROW = 256;
  * The samples on the GPU: one buffer an attribute, where a block's place follows from its number, and a table texture with
  * each block's quantisation box and count. Blocks that have not come have count 0 and are culled by the vertex shader.
  */
-export class SampleSurface {
+export class SampleSurface implements StagedSurface {
   readonly geometry = new BufferGeometry();
   readonly blockTable: DataTexture;
-  readonly layout: SurfaceLayout;
-  readonly prefixes: LayerPrefix[];
+  readonly room: number;
   loadedSamples = 0;
 
+  private layout_: SurfaceLayout;
+  private prefixes_: LayerPrefix[];
   private readonly gl_: WebGL2RenderingContext;
   private readonly buffers_ = new Map<Field, WebGLBuffer>();
   private readonly table_: Float32Array;
 
-  constructor(gl: WebGL2RenderingContext, layout: SurfaceLayout) {
+  /** For frames of this layout, or of others of the same attributes and up to `room` blocks. */
+  constructor(gl: WebGL2RenderingContext, layout: SurfaceLayout, room: number) {
     this.gl_ = gl;
-    this.layout = layout;
-    this.prefixes = layerPrefixes(layout.sampleCount, layout.blockSize, layout.blockCount);
-    const rows = Math.max(1, Math.ceil(layout.blockCount / BLOCKS_PER_ROW));
+    this.layout_ = layout;
+    this.prefixes_ = layerPrefixes(layout.sampleCount, layout.blockSize, layout.blockCount);
+    this.room = Math.max(room, layout.blockCount);
+    const rows = Math.max(1, Math.ceil(this.room / BLOCKS_PER_ROW));
     this.table_ = new Float32Array(rows * BLOCKS_PER_ROW * 8);
     this.blockTable = new DataTexture(this.table_, BLOCKS_PER_ROW * 2, rows, RGBAFormat, FloatType);
     this.blockTable.minFilter = NearestFilter;
@@ -98,17 +104,32 @@ export class SampleSurface {
   }
 
   get capacity(): number {
-    return this.layout.blockCount * this.layout.blockSize;
+    return this.room * this.layout_.blockSize;
   }
 
-  /** Whether frames of `layout` fit the buffers as they stand. */
-  fits(layout: SurfaceLayout): boolean {
-    return (Object.keys(layout) as (keyof SurfaceLayout)[]).every((key) => layout[key] === this.layout[key]);
+  get layout(): SurfaceLayout {
+    return this.layout_;
+  }
+
+  get prefixes(): readonly LayerPrefix[] {
+    return this.prefixes_;
+  }
+
+  begin(layout: SurfaceLayout): boolean {
+    const { blockCount: _, sampleCount: __, stretchRange: ___, ...have } = this.layout_;
+    const same = (Object.keys(have) as (keyof typeof have)[]).every((key) => have[key] === layout[key]);
+    if (!same || layout.blockCount > this.room) return false;
+    this.layout_ = layout;
+    this.prefixes_ = layerPrefixes(layout.sampleCount, layout.blockSize, layout.blockCount);
+    this.loadedSamples = 0;
+    this.table_.fill(0);
+    this.blockTable.needsUpdate = true;
+    return true;
   }
 
   /** Uploads one block: one bufferSubData an attribute, and two texels of the table. */
   put(block: SurfaceBlock): void {
-    const slot = block.index * this.layout.blockSize;
+    const slot = block.index * this.layout_.blockSize;
     this.upload("positions", slot, block.positions);
     this.upload("normals", slot, block.normals);
     this.upload("detail", slot, block.detail);
@@ -129,7 +150,7 @@ export class SampleSurface {
   readBack(): { positions: Uint16Array; marks: Uint8Array | null; table: Float32Array } {
     const positions = new Uint16Array(this.capacity * 4);
     this.readBuffer("positions", positions);
-    const marks = this.layout.hasMarks ? new Uint8Array(this.capacity) : null;
+    const marks = this.layout_.hasMarks ? new Uint8Array(this.capacity) : null;
     if (marks) this.readBuffer("marks", marks);
     return { positions, marks, table: this.table_ };
   }

@@ -13,6 +13,7 @@ import { type Hit, Picker } from "./picker";
 import { type RegionCentres, regionCentres } from "./region-centres";
 import { SampleSurface, type SurfaceBlock, type SurfaceLayout } from "./sample-surface";
 import { StrokeMask } from "./stroke-mask";
+import { SurfaceStage } from "./surface-stage";
 import { setResidual, setUniform, vectorUniform } from "./uniforms";
 import { type FocusPlane, squareView } from "./view-matrix";
 
@@ -55,7 +56,9 @@ export class Viewport {
   private readonly picker_: Picker;
   private readonly pacer_ = new Pacer();
   private readonly observer_: ResizeObserver;
-  private surface_: SampleSurface | null = null;
+  private readonly stage_ = new SurfaceStage<SampleSurface>(
+    (layout, room) => new SampleSurface(this.gl, layout, room),
+  );
   private display_: DisplaySettings = DEFAULT_DISPLAY;
   private spacing_ = 0;
   private fullSamples_ = 0;
@@ -122,8 +125,19 @@ export class Viewport {
     this.pacer_.patient = patient;
   }
 
+  /** Of the frame that is drawn. */
   get loadedSamples(): number {
     return this.surface_?.loadedSamples ?? 0;
+  }
+
+  /** Of the frame that comes. */
+  get arrivedSamples(): number {
+    return this.stage_.coming?.loadedSamples ?? 0;
+  }
+
+  /** Whether a frame is on the screen whole. */
+  get whole(): boolean {
+    return this.stage_.whole;
   }
 
   get display(): DisplaySettings {
@@ -136,39 +150,34 @@ export class Viewport {
     this.invalidate();
   }
 
-  /** Median distance between neighbouring samples of the whole cloud, for the splats' size. */
+  /** Median distance between neighbouring samples of the whole cloud, for the splats' size; a frame may have more samples. */
   setSpacing(spacing: number, fullSamples: number): void {
     this.spacing_ = spacing;
     this.fullSamples_ = fullSamples;
     this.invalidate();
   }
 
-  /** Makes room for a frame's blocks, or keeps the buffers where they fit. */
+  /** A frame's blocks follow. */
   beginFrame(layout: SurfaceLayout, key: boolean): void {
-    if (this.surface_?.fits(layout)) return;
-    if (!key) return;
-    this.surface_?.dispose();
-    this.surface_ = new SampleSurface(this.gl, layout);
-    this.passes_.setSurface(this.surface_);
+    this.stage_.begin(layout, key);
+    // The first one is on the screen while it comes.
+    if (key && this.surface_ && !this.whole) this.passes_.setSurface(this.surface_);
   }
 
   /** Uploads one block; false where there is no surface that it belongs to. */
   putBlock(block: SurfaceBlock): boolean {
-    if (!this.surface_ || this.contextLost_) return false;
-    this.surface_.put(block);
-    this.invalidate();
+    if (this.contextLost_ || !this.stage_.put(block)) return false;
+    if (this.stage_.coming === this.surface_) this.invalidate();
     return true;
   }
 
-  setBounds(center: Vec3, radius: number, stretchRange: number): void {
+  setBounds(center: Vec3, radius: number): void {
     this.rig.setBounds(center, radius);
     setUniform(this.passes_.uniforms.shade, "objectRadius", Math.max(radius, 1e-12));
-    setUniform(this.passes_.uniforms.splat, "stretchRange", stretchRange);
   }
 
   clearSurface(): void {
-    this.surface_?.dispose();
-    this.surface_ = null;
+    this.stage_.clear();
     this.invalidate();
   }
 
@@ -195,8 +204,14 @@ export class Viewport {
     return this.picker_.pick((clientX - box.left) / box.width, (clientY - box.top) / box.height);
   }
 
-  /** A frame of this revision is on the screen whole: what stood in for it goes. */
-  frameShown(revision: number): void {
+  /** The frame of this revision has come whole: it takes the screen, and what stood in for it goes. */
+  endFrame(revision: number, preview: boolean): void {
+    const before = this.surface_;
+    this.stage_.end(!preview);
+    if (this.surface_ && this.surface_ !== before) {
+      this.passes_.setSurface(this.surface_);
+      this.invalidate();
+    }
     this.mask.frameShown(revision);
     this.outline.frameShown(revision);
   }
@@ -261,9 +276,13 @@ export class Viewport {
     clearTimeout(this.timer_);
     this.observer_.disconnect();
     this.rig.dispose();
-    this.surface_?.dispose();
+    this.stage_.clear();
     this.renderer_.dispose();
     this.canvas.remove();
+  }
+
+  private get surface_(): SampleSurface | null {
+    return this.stage_.front;
   }
 
   private schedule(): void {
@@ -312,7 +331,8 @@ export class Viewport {
     const prefix = surface ? prefixWithin(surface.prefixes, budget) : { blocks: 0, samples: 0 };
     // Fewer samples stand wider apart: their discs grow so that the surface stays closed.
     const shown = surface ? Math.max(1, Math.min(prefix.samples, Math.max(surface.loadedSamples, 1))) : 1;
-    const sparse = Math.sqrt(Math.max(1, this.fullSamples_) / shown);
+    const full = Math.max(1, this.fullSamples_, surface?.layout.sampleCount ?? 0);
+    const sparse = Math.sqrt(full / shown);
     const scale = Math.max(1, sparse) * this.display_.splatSize;
     setUniform(splat, "splatScale", scale);
     setUniform(splat, "splatRadius", this.spacing_ * SPLAT_SPACINGS * scale);
@@ -342,7 +362,7 @@ export class Viewport {
   private readonly contextLost = (event: Event): void => {
     event.preventDefault();
     this.contextLost_ = true;
-    this.surface_ = null;
+    this.stage_.forget();
     this.fence_ = null;
     this.onContext?.(true);
   };

@@ -33,6 +33,7 @@ export function createDisplayPanel(
       ["normals", "Normals"],
       ["t", "Scale t"],
       ["detail", "Signed detail"],
+      ["stretch", "Stretch"],
     ],
     settings.mode,
     (value) => change({ mode: value }),

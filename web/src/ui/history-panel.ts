@@ -1,5 +1,6 @@
 import type { EditRecord, History } from "../api/types";
 import { describeEdit } from "../edits/deformation";
+import { describeSamples } from "../edits/resampling";
 import type { Bus } from "../session-store";
 import { h, replaceChildren, setText } from "./dom";
 import { formatAge, formatCount } from "./format";
@@ -29,7 +30,9 @@ export function createHistoryPanel(bus: Bus, playback: HTMLElement): HTMLElement
     return h("li", {}, button);
   };
   const describe = (record: EditRecord): string =>
-    `${formatCount(record.moved_samples)} samples · ${formatAge(record.created)}`;
+    [`${formatCount(record.moved_samples)} samples`, describeSamples(record), formatAge(record.created)]
+      .filter(Boolean)
+      .join(" · ");
   const show = (history: History): void => {
     const entries = history.edits.map((record) =>
       entry(describeEdit(record.edit), describe(record), record.index, history.head),

@@ -47,14 +47,24 @@ interface Chosen {
   id: string | null;
 }
 
-/** Regions by the pixels of an image: laid over the view and cast along it, or by the cloud's own texture coordinates. */
+export interface ImageForm {
+  element: HTMLElement;
+  /** Takes the image away that lies over the view; false where none does. */
+  dismiss(): boolean;
+}
+
+/**
+ * Regions by the pixels of an image: laid over the view and cast along it, or by the cloud's own texture coordinates. Folding
+ * the `holder` takes the image away.
+ */
 export function createImageForm(
   bus: Bus,
   client: ApiClient,
   store: SessionStore,
   regions: RegionEditor,
   viewport: Viewport,
-): HTMLElement {
+  holder: HTMLDetailsElement,
+): ImageForm {
   let chosen: Chosen | null = null;
   let placer: ImagePlacer | null = null;
   let use: Use = "both";
@@ -100,11 +110,6 @@ export function createImageForm(
   };
   bus.on("tool.changed", (tool) => {
     if (tool !== "orbit") takeAway();
-  });
-  bus.function("image.dismiss", () => {
-    const laid = placer !== null;
-    takeAway();
-    return laid;
   });
   const drop = (): void => {
     chosen?.bitmap.close();
@@ -289,11 +294,13 @@ export function createImageForm(
     input,
     controls,
   );
-  const holder = h(
-    "details",
-    { class: "sub", ontoggle: place },
-    h("summary", {}, h("span", { class: "sub-title" }, "Regions from an image"), icon("chevron")),
-    form,
-  );
-  return holder;
+  holder.addEventListener("toggle", place);
+  return {
+    element: form,
+    dismiss() {
+      const laid = placer !== null;
+      takeAway();
+      return laid;
+    },
+  };
 }

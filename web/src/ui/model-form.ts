@@ -8,14 +8,17 @@ import type { Bus, SessionStore } from "../session-store";
 import { h, replaceChildren } from "./dom";
 import { numberField, selectField, vectorField } from "./fields";
 import { formatCount } from "./format";
-import { icon } from "./icons";
 
-/** Regions by another cloud of the server: what is near its samples, once it is placed. */
+/**
+ * Regions by another cloud of the server: what is near its samples, once it is placed. The list of clouds is fetched anew
+ * whenever the `holder` is opened.
+ */
 export function createModelForm(
   bus: Bus,
   client: ApiClient,
   store: SessionStore,
   regions: RegionEditor,
+  holder: HTMLDetailsElement,
 ): HTMLElement {
   let region: RegionName = "one";
   const cloud = selectField("Model", [["", "…"]], "", () => undefined);
@@ -83,16 +86,9 @@ export function createModelForm(
     size.element,
     apply,
   );
-  const holder: HTMLDetailsElement = h(
-    "details",
-    {
-      class: "sub",
-      ontoggle: () => {
-        if (holder.open) void load();
-      },
-    },
-    h("summary", {}, h("span", { class: "sub-title" }, "Regions from another model"), icon("chevron")),
-    form,
-  );
-  return holder;
+  holder.addEventListener("toggle", () => {
+    if (holder.open) void load();
+  });
+  if (holder.open) void load();
+  return form;
 }

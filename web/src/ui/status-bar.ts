@@ -1,3 +1,5 @@
+import { samplesBefore } from "../edits/resampling";
+import type { LoadStatus } from "../event-map";
 import type { Bus, SessionStore } from "../session-store";
 import { h, setText } from "./dom";
 import { formatCount, formatMs, formatRate } from "./format";
@@ -16,13 +18,23 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
   });
   const radius = h("span", { class: "status-item", data: { status: "spacing" } });
 
-  bus.on("load.changed", ({ loaded, total, complete }) => {
-    setText(
-      samples,
-      complete || loaded >= total
-        ? `${formatCount(total)} samples`
-        : `${formatCount(loaded)} of ${formatCount(total)} samples`,
-    );
+  /** Before all of the edits. */
+  let first = store.document.sample_count;
+  let load: LoadStatus = { loaded: first, total: first, complete: true };
+  const showSamples = (): void => {
+    const { loaded, total, complete } = load;
+    const now = `${formatCount(total)} samples`;
+    if (!complete && loaded < total) setText(samples, `${formatCount(loaded)} of ${now}`);
+    else setText(samples, total === first ? now : `${formatCount(first)} → ${now}`);
+    samples.title = total === first ? "" : "As loaded, and as shown";
+  };
+  bus.on("load.changed", (status) => {
+    load = status;
+    showSamples();
+  });
+  bus.on("history.changed", ({ edits }) => {
+    first = samplesBefore(edits, store.document.sample_count);
+    showSamples();
   });
   const showSession = (): void => {
     const { document } = store;
@@ -30,13 +42,15 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
     setText(radius, `spacing ${Number(document.spacing.toPrecision(3))}`);
   };
   bus.on("session.changed", showSession);
-  bus.on("preview.changed", ({ state, latencyMs, samplesPerSecond }) => {
+  bus.on("preview.changed", ({ state, resampled, latencyMs, samplesPerSecond }) => {
     badge.className = `badge ${state}`;
     badge.title = state === "waiting" ? "The picture shows what it can; the server computes the rest" : "";
     if (state === "preview") setText(badge, "Preview");
     else if (state === "waiting") setText(badge, "Waiting for the server");
     else if (state === "exact") {
-      setText(badge, "Exact");
+      setText(badge, resampled ? "Resampled" : "Exact");
+      if (resampled)
+        badge.title = "The server's frame, with samples inserted; recording relaxes them further";
       setText(timing, `${formatMs(latencyMs)} · ${formatRate(samplesPerSecond)}`);
       timing.title = "From the hand to the exact frame on the screen, and samples a second at that pace";
     } else setText(badge, "");

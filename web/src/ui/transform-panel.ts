@@ -5,6 +5,7 @@ import type { Bus } from "../session-store";
 import { append, h, replaceChildren, setText } from "./dom";
 import { createEditOptions } from "./edit-options";
 import { icon } from "./icons";
+import { createResamplingOptions } from "./resampling-options";
 import { createSection } from "./section";
 import { createStepsList } from "./steps-list";
 import { createKindFields } from "./transform-fields";
@@ -60,6 +61,7 @@ export function createTransformPanel(
   const commit = (): void => void bus.invoke("edit.commit");
   const numbers = createKindFields(editor, session.diagonal, commit);
   const options = createEditOptions(session, editor);
+  const resampling = createResamplingOptions(editor);
   let tool: ToolName = "orbit";
   let shown: TransformState = editor.state;
 
@@ -127,7 +129,7 @@ export function createTransformPanel(
   const steps = createStepsList(editor, (kind) => bus.invoke("tool.activate", kind));
   const summary = h("p", { class: "hint", aria: { live: "polite" } });
   const fields = h("div", { class: "transform-fields" });
-  append(section.body, [kinds, fields, summary, options.detail]);
+  append(section.body, [kinds, fields, resampling.main, summary, resampling.numbers, options.detail]);
 
   const layOut = (): void => {
     const kind = kindOf(tool);
@@ -153,6 +155,7 @@ export function createTransformPanel(
       for (const input of numbers[kind].inputs) input.disabled = state.obstacle !== null;
     }
     options.show(state);
+    resampling.show(kind && state);
     steps.show(state);
     const ready = state.obstacle === null && editor.pending;
     apply.disabled = !ready;

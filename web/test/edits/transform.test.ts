@@ -10,7 +10,7 @@ import { SessionStore } from "../../src/session-store";
 import { MockSession } from "../mock/session";
 
 /** An editor over two bands of detail, and what it sends. */
-function bench(painted = true) {
+function bench(painted = true, refusal?: () => object | null) {
   const shape = {
     count: 2,
     positions: new Float32Array([0, 0, 0, 1, 1, 1]),
@@ -33,6 +33,8 @@ function bench(painted = true) {
         path: new URL(String(url)).pathname,
         body: JSON.parse(String(init?.body ?? "{}")),
       });
+    const refused = method === "GET" ? null : refusal?.();
+    if (refused) return new Response(JSON.stringify(refused), { status: 413 });
     return new Response(JSON.stringify(document), { headers: { "Content-Type": "application/json" } });
   });
   const bus = new Events<Notices, Questions>();
@@ -46,7 +48,7 @@ function bench(painted = true) {
   );
   const posted = (): Record<string, unknown>[] =>
     sent.filter(({ method }) => method === "POST").map(({ body }) => body);
-  return { editor, sent, posted, toasts };
+  return { editor, bus, sent, posted, toasts };
 }
 
 test("an edit is sent with its level, blend and deformation; detail only where it changes", async () => {
@@ -81,6 +83,64 @@ test("the detail alone is an edit, of the bands that are rebuilt, and starts ove
   editor.cancel();
   expect(editor.state.gains).toEqual([1, 1]);
   expect(editor.description).toBe("");
+});
+
+test("resampling goes with previews and edits, and stays for the next one", async () => {
+  const { editor, sent, posted } = bench();
+  const pull = translation([0, 0, 1]);
+  const resampling = { bound: 2, min_spacing: 0, shear_aware: false, collect: 0 };
+  editor.set(pull);
+  await editor.preview.idle();
+  editor.setResampling({ on: true, bound: 2 });
+  await editor.preview.idle();
+  expect(sent.map(({ body }) => body["resampling"])).toEqual([undefined, resampling]);
+  await editor.commit();
+  editor.set(pull);
+  await editor.commit();
+  expect(posted()).toEqual(Array(2).fill({ level: 0, blend: "quartic", deformation: pull, resampling }));
+  editor.setResampling({ on: false });
+  editor.set(pull);
+  await editor.commit();
+  expect(posted()[2]).not.toHaveProperty("resampling");
+});
+
+test("too many samples are told at the field until something changes, and the edit stays pending", async () => {
+  let refusal: object | null = {
+    title: "Too large",
+    status: 413,
+    limit: 300_000,
+    actual: 412_345,
+    errors: [{ pointer: "/resampling/max_samples", detail: "too many samples" }],
+  };
+  const { editor, toasts } = bench(true, () => refusal);
+  editor.setResampling({ on: true });
+  editor.set(translation([0, 0, 1]));
+  await editor.preview.idle();
+  expect(toasts).toEqual([]);
+  expect(editor.state.resamplingFault?.text).toMatch(/412,345 .* 300,000 /);
+  await editor.commit();
+  expect(toasts).toEqual(["The edit was not recorded: Too large"]);
+  expect(editor.state.resamplingFault).not.toBeNull();
+  expect(editor.pending).toBe(true);
+  refusal = null;
+  editor.setResampling({ bound: 3 });
+  expect(editor.state.resamplingFault).toBeNull();
+  await editor.commit();
+  expect(editor.pending).toBe(false);
+});
+
+test("a frame with other samples than the committed ones is told as resampled", async () => {
+  const { editor, bus, sent } = bench();
+  const states: string[] = [];
+  bus.on("preview.changed", ({ state, resampled }) => states.push(resampled ? `${state}, resampled` : state));
+  editor.setResampling({ on: true });
+  editor.set(translation([0, 0, 1]));
+  await editor.preview.idle();
+  const sequence = editor.preview.lastSequence;
+  bus.fire("frame.applied", { sequence, revision: 1, samples: 3 });
+  bus.fire("frame.applied", { sequence, revision: 1, samples: 2 });
+  expect(states).toEqual(["preview", "exact, resampled", "exact"]);
+  expect(sent.length).toBe(1);
 });
 
 test("previews say the same as the edit that follows, and a number", async () => {

@@ -39,6 +39,15 @@ test("a budget takes the largest prefix that it holds, and never none", () => {
   expect(prefixWithin(prefixes, 1).samples).toBe(1000);
 });
 
+test("the stretch is a mode of links with a map of its own, and made-up modes are none", () => {
+  const settings = displayOfUrlMode("stretch", DEFAULT_DISPLAY);
+  expect(settings?.mode).toBe("stretch");
+  expect(settings && urlModeOf(settings)).toBe("stretch");
+  expect(settings && colormapOf(settings)).toBe("heat");
+  expect(settings && colormapOf({ ...settings, colorBlindSafe: true })).toBe("viridis");
+  expect(displayOfUrlMode("toString", DEFAULT_DISPLAY)).toBeNull();
+});
+
 test("colour maps end where they should and stay within bytes", () => {
   expect(sampleColormap("coolwarm", 0)).toEqual([36, 72, 196]);
   expect(sampleColormap("coolwarm", 1)).toEqual([178, 24, 36]);

@@ -8,6 +8,7 @@ import {
   translation,
   twisting,
 } from "../../src/edits/deformation";
+import { DEFAULT_RESAMPLING } from "../../src/edits/resampling";
 import type { TransformKind, TransformState } from "../../src/event-map";
 import { multiply, quaternionOf } from "../../src/math/quaternion";
 import { normalise, type Vec3 } from "../../src/math/vec3";
@@ -28,6 +29,8 @@ function stateOf(deformation: ElementaryDeformation | null): TransformState {
     level: 0,
     blend: "quartic",
     gains: [1],
+    resampling: DEFAULT_RESAMPLING,
+    resamplingFault: null,
     obstacle: null,
   };
 }

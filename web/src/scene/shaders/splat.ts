@@ -168,7 +168,7 @@ void main() {
 
 /** Second pass: albedo and normal of all the splats that make up the front surface, weighted by their distance. */
 export const ATTRIBUTE_VERTEX = /* glsl */ `${DECODE}
-uniform int mode;         // 0 clay, 1 colour, 2 normals, 3 t, 4 detail
+uniform int mode;         // 0 clay, 1 colour, 2 normals, 3 t, 4 detail, 5 stretch
 uniform bool tintRegions;
 uniform sampler2D colormap;
 uniform vec3 clay;
@@ -187,6 +187,11 @@ void main() {
   else if (mode == 2) albedo = toLinear(normal * 0.5 + 0.5);
   else if (mode == 3) albedo = toLinear(texture(colormap, vec2(position.w, 0.5)).rgb);
   else if (mode == 4) albedo = toLinear(texture(colormap, vec2(detail.x * 0.5 + 0.5, 0.5)).rgb);
+  else if (mode == 5) {
+    // Each doubling takes half of the map: 1 to 4.
+    float doublings = stretchRange > 0.0 ? log2(clamp(decodeStretch(detail.y), 1.0, 4.0)) : 0.0;
+    albedo = toLinear(texture(colormap, vec2(0.5 * doublings, 0.5)).rgb);
+  }
   if (tintRegions && mode < 2) {
     if (mark > 1.5) albedo = mix(albedo, oneColor, 0.86);
     else if (mark > 0.5) albedo = mix(albedo, zeroColor, 0.86);
