@@ -94,8 +94,9 @@ DeformArgs deform_args(const DeformMap& map, const std::vector<std::uint32_t>& b
   POINTWRIGHT_CHECK(deformed.position.size() == n && deformed.normal.size() == n, "room for the result");
   POINTWRIGHT_CHECK(field.size() == n && field.t.size() >= padded_to_block(n), "a field of the same samples");
   const bool offsets = map.step_count > 0 && map.step[0].kind == DeformKind::kAlongNormal;
-  POINTWRIGHT_CHECK(!offsets || (shape != nullptr && shape->size() >= padded_to_block(n)),
-                    "shape operators of the same samples");
+  const std::size_t reached = blocks.empty() ? 0 : (std::size_t{blocks.back()} + 1) * kSimdBlock;
+  POINTWRIGHT_CHECK(!offsets || blocks.empty() || (shape != nullptr && shape->size() >= reached),
+                    "shape operators of the samples that move");
   const Points& p = level.position;
   const Points& m = level.normal;
   const Points& g = field.gradient;
@@ -108,7 +109,7 @@ DeformArgs deform_args(const DeformMap& map, const std::vector<std::uint32_t>& b
                   .normal = {m.x(), m.y(), m.z()},
                   .deformed_position = {deformed.position.x(), deformed.position.y(), deformed.position.z()},
                   .deformed_normal = {deformed.normal.x(), deformed.normal.y(), deformed.normal.z()}};
-  if (offsets) {
+  if (offsets && shape != nullptr) {
     args.shape[0] = shape->uu.data();
     args.shape[1] = shape->uv.data();
     args.shape[2] = shape->vv.data();

@@ -15,7 +15,8 @@ namespace pointwright {
 DeformMap to_deform_map(const Deformation& deformation, const Vec3d& origin);
 
 /// Arguments that deform the samples of `blocks` of a level into `deformed`, which has its size.
-/// Pre: a field of the same samples, shape operators where the map goes along the normal.
+/// Pre: ascending blocks, a field of the same samples, shape operators of those of the blocks where the map
+///      goes along the normal.
 DeformArgs deform_args(const DeformMap& map, const std::vector<std::uint32_t>& blocks,
                        const ScaleField& field, const Level& level, Level& deformed,
                        const ShapeOperators* shape);

@@ -188,10 +188,8 @@ class ResampledDrag::Work {
     if (count == 0) return after;
     after->cloud = std::make_shared<const Cloud>(
         with_children(inserted, *sampling_->cloud, edited.finest(), sampling_->next_id));
-    if (!preview) {
-      after->graph = std::make_shared<const NeighborGraph>(
-          updated_neighborhoods(*sampling_->graph, inserted, edited.finest().position));
-    }
+    after->graph = std::make_shared<const NeighborGraph>(
+        preview ? all_graph_ : updated_neighborhoods(*sampling_->graph, inserted, edited.finest().position));
     after->parent.resize(before_, kNoParent);
     after->parent.reserve(before_ + count);
     after->spacing.reserve(before_ + count);

@@ -17,7 +17,7 @@ namespace pointwright {
 enum class ResamplingEffort {
   kExact,  ///< what is recorded
   /// Of a drag's frame: fewer sweeps of relaxation, at most 100,000 samples inserted, wider apart where it
-  /// would be more; nothing is collected, and the sampling's graph stays that of the samples before.
+  /// would be more; nothing is collected, and the sampling's graph has neighbours at rest.
   kPreview,
 };
 
