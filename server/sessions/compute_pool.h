@@ -67,8 +67,8 @@ auto computed(ComputePool& pool, Work work) -> Outcome<decltype(work())> {
 }
 
 /// Runs its tasks on the pool, one after the other, in the order in which they were posted. Thread-safe.
-/// Tasks that still wait when the strand is destroyed run nevertheless (they keep its state alive); those that
-/// still wait when the pool ends are dropped, as its own are.
+/// Tasks that still wait when the strand is destroyed run nevertheless (they keep its state alive); those
+/// that still wait when the pool ends are dropped, as its own are.
 class Strand {
  public:
   explicit Strand(ComputePool& pool) : state_(std::make_shared<State>(pool)) {}
@@ -92,8 +92,8 @@ class Strand {
     std::deque<std::function<void()>> tasks;
     bool running = false;
   };
-  /// The place of a strand in the pool's queue. Where it is dropped there, so are the strand's tasks: one that
-  /// holds the owner of its strand would otherwise keep itself for ever.
+  /// The place of a strand in the pool's queue. Where it is dropped there, so are the strand's tasks: one
+  /// that holds the owner of its strand would otherwise keep itself for ever.
   struct Turn {
     explicit Turn(std::shared_ptr<State> of) : state(std::move(of)) {}
     Turn(const Turn&) = delete;
