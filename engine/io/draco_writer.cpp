@@ -170,10 +170,8 @@ draco::Status encode(draco::PointCloud& cloud, int position, int position_bits, 
   if (position_bits > 0) encoder.SetAttributeQuantization(position, position_bits);
   if (coding == Coding::kPlain) {
     encoder.SetUseBuiltInAttributeCompression(false);
-    for (int id = 0; id < cloud.num_attributes(); ++id) {
-      const draco::Status set = encoder.SetAttributePredictionScheme(id, draco::PREDICTION_NONE);
-      if (!set.ok()) return set;
-    }
+    const draco::Status set = encoder.SetAttributePredictionScheme(position, draco::PREDICTION_NONE);
+    if (!set.ok()) return set;
   }
   return encoder.EncodeToBuffer(&buffer);
 }

@@ -137,16 +137,20 @@ TEST_CASE("a column of another length is malformed and named") {
   CHECK(result.error().field == field);
 }
 
-TEST_CASE("ids that are no permutation are malformed") {
+TEST_CASE("ids may have gaps, as inserted and removed samples leave them") {
   Cloud cloud = full_cloud(20);
-  SUBCASE("repeated") {
+  cloud.id[3] = 20;
+  cloud.id[7] = 0xfffffffeU;
+  CHECK(validate(cloud).ok());
+}
+
+TEST_CASE("ids of two samples that are the same are malformed") {
+  Cloud cloud = full_cloud(20);
+  SUBCASE("neighbours") {
     cloud.id[3] = 4;
   }
-  SUBCASE("beyond the count") {
-    cloud.id[3] = 20;
-  }
-  SUBCASE("far beyond") {
-    cloud.id[3] = 0xffffffffU;
+  SUBCASE("far apart and beyond the count") {
+    cloud.id[3] = cloud.id[17] = 0xffffffffU;
   }
   const auto result = validate(cloud);
   REQUIRE_FALSE(result.ok());
