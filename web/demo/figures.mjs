@@ -86,7 +86,7 @@ async function pulledPlane(url) {
   const circle = (radius) => add({ type: "sphere", center: [0, 0, 0], radius });
   await put(url, session, "zero", [circle(0.9), { mode: "invert" }]);
   await put(url, session, "one", [circle(0.1)]);
-  const camera = { position: [0.9, -3.4, 2.3], target: [0, 0, 0.62], up: [0, 0, 1] };
+  const camera = { position: [1.1, -4.5, 2.7], target: [0, 0, 0.82], up: [0, 0, 1] };
   const file = (name) => resolve(out, `${name}.png`);
   const picture = (id, name) => takePicture(url, id, file(name), { camera, mode: "color", size });
   const clear = async () => {
