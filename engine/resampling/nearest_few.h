@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 
 namespace pointwright {
 
@@ -16,6 +17,7 @@ class NearestFew {
 
   /// `distance`: or its square, but for all alike.
   void consider(float distance, std::uint32_t sample) {
+    if (distance > worst_) return;  // most are
     if (wanted_ == 0 || (count_ == wanted_ && !before(distance, sample, count_ - 1))) return;
     std::uint32_t place = count_;
     while (place > 0 && before(distance, sample, place - 1)) --place;
@@ -27,6 +29,7 @@ class NearestFew {
     }
     distance_[place] = distance;
     sample_[place] = sample;
+    if (count_ == wanted_) worst_ = distance_[count_ - 1];
   }
 
   [[nodiscard]] std::uint32_t count() const { return count_; }
@@ -39,6 +42,7 @@ class NearestFew {
 
   std::uint32_t wanted_;
   std::uint32_t count_ = 0;
+  float worst_ = std::numeric_limits<float>::infinity();  // that can still be among them
   std::array<float, Most> distance_{};
   std::array<std::uint32_t, Most> sample_{};
 };

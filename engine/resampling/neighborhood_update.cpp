@@ -32,9 +32,15 @@ class Update {
   // The row of sample i, `old` the one of before that its candidates come from.
   void set_row(std::size_t i, std::uint32_t old, NeighborGraph& graph) const {
     NearestFew<kMostNeighbors> nearest(graph.k);
+    const float* const x = position_.x();
+    const float* const y = position_.y();
+    const float* const z = position_.z();
     const Vec3f here = position_[i];
     const auto consider = [&](std::uint32_t j) {
-      const float distance = (position_[j] - here).squaredNorm();
+      const float dx = x[j] - here.x();
+      const float dy = y[j] - here.y();
+      const float dz = z[j] - here.z();
+      const float distance = dx * dx + dy * dy + dz * dz;
       if (distance > 0.0F) nearest.consider(distance, j);  // neither itself nor a copy
     };
     const auto consider_family = [&](std::uint32_t sample) {
