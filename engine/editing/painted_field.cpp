@@ -82,8 +82,10 @@ PaintedField::Windows PaintedField::windows_of(const Points& position) {
       Box3f box;
       for (std::size_t i = first; i < std::min(end, first + kWindow); ++i) box.extend(position[i]);
       // Halves first: the sum of two large coordinates must not overflow.
-      windows.middle.set(first / kWindow, 0.5F * box.min + 0.5F * box.max);
-      windows.half[first / kWindow] = 0.5F * box.diagonal();
+      const Vec3f middle = 0.5F * box.min + 0.5F * box.max;
+      windows.middle.set(first / kWindow, middle);
+      // From the middle as it was rounded: every sample of the window is as near.
+      windows.half[first / kWindow] = (box.max - middle).cwiseMax(middle - box.min).norm();
     }
   });
   return windows;

@@ -44,7 +44,7 @@ class PaintedField {
   // Runs of samples, and the greatest distances that t depends on in each.
   struct Windows {
     Points middle;
-    std::vector<float> half;  // half of the box's diagonal
+    std::vector<float> half;  // how far the window's samples may be from it
     std::vector<float> zero_reach;
     std::vector<float> one_reach;
   };

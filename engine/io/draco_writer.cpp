@@ -120,13 +120,15 @@ void add_standard_columns(const Cloud& cloud, CloudBuilder& builder) {
   }
 }
 
-// libdraco codes integers as differences in 32 signed bits, and fails where they do not fit.
+// libdraco codes integers as differences that it folds and shifts in 32 bits. Spans from somewhat below 2^31
+// on come back wrong without a word; a quarter of that leaves room for whatever it does on the way.
 template <typename T>
 bool spans_too_much(const std::vector<T>& values) {
   if constexpr (std::is_integral_v<T> && sizeof(T) == 4) {
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
-    constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
-    return std::int64_t{*high} > kMost || std::int64_t{*high} - std::int64_t{*low} >= kMost;
+    constexpr std::int64_t kMost = std::int64_t{1} << 29;
+    return std::int64_t{*high} > kMost || std::int64_t{*low} < -kMost ||
+           std::int64_t{*high} - std::int64_t{*low} >= kMost;
   }
   return false;
 }

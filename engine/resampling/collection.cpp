@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 #include <vector>
 
 #include "engine/core/parallel.h"
@@ -241,14 +242,28 @@ std::vector<T> gathered(const std::vector<T>& column, const std::vector<std::uin
   return result;
 }
 
+// The parents, where an inserted one is gone that one's own: whoever stays descends from somebody.
+std::vector<std::uint32_t> adopted(const Sampling& sampling, const std::vector<std::uint8_t>& gone) {
+  std::vector<std::uint32_t> parent = sampling.parent;
+  std::unordered_map<std::uint32_t, std::uint32_t> parent_of_gone;  // by id
+  for (std::size_t i = 0; i < parent.size(); ++i)
+    if (gone[i] != 0 && parent[i] != kNoParent) parent_of_gone.emplace(sampling.cloud->id[i], parent[i]);
+  for (std::uint32_t& id : parent) {
+    for (auto found = parent_of_gone.find(id); found != parent_of_gone.end(); found = parent_of_gone.find(id))
+      id = found->second;
+  }
+  return parent;
+}
+
 }  // namespace
 
-void collect(const ScaleField& field, float closest, ResampledEdit& result) {
+void collect(const ScaleField& field, float closest, ResampledEdit& result, const ExecutionContext* context) {
   const Sampling& sampling = *result.sampling;
   Collection collection(result.surface, sampling, field, closest);
   // Inserted samples first, all that stand too close to anybody: originals take their cells back.
   for (const bool inserted_alone : {true, false}) {
     for (std::size_t round = 0; round < kMostRounds && collection.round(inserted_alone); ++round) {
+      if (context != nullptr && context->is_cancelled()) return;
     }
   }
   const std::vector<std::uint32_t> order = collection.survivors();
@@ -259,7 +274,7 @@ void collect(const ScaleField& field, float closest, ResampledEdit& result) {
   left->graph = std::make_shared<const NeighborGraph>(
       survivors_graph(*sampling.graph, collection.gone(), order, result.surface.finest().position));
   left->spacing = gathered(sampling.spacing, order);
-  left->parent = gathered(sampling.parent, order);
+  left->parent = gathered(adopted(sampling, collection.gone()), order);
   left->cell_u = gathered(collection.cells().u, order);
   left->cell_v = gathered(collection.cells().v, order);
   left->next_id = sampling.next_id;

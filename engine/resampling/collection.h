@@ -14,6 +14,8 @@ namespace pointwright {
 /// Shapes:      t of result.surface's samples; closest in (0, kGreatestCollectDistance]
 /// Cost:        O(S log S) a round for S squeezed samples, a copy of everything where one is removed
 /// Determinism: bitwise equal for any thread count
-void collect(const ScaleField& field, float closest, ResampledEdit& result);
+/// Cancels:     between rounds; the result is then unfinished and must be dropped
+void collect(const ScaleField& field, float closest, ResampledEdit& result,
+             const ExecutionContext* context = nullptr);
 
 }  // namespace pointwright

@@ -21,12 +21,26 @@ constexpr std::uint32_t kPreviewSweeps = 2;
 constexpr std::size_t kPreviewChildren = 100'000;
 constexpr float kCoarserStep = 1.25F;
 
-void truncate(MultiresSurface& surface, std::size_t count) {
-  for (Level& level : surface.levels) {
-    level.position.resize(count);
-    level.normal.resize(count);
+// Columns with their padding, which histories of surfaces compare as well.
+void copy_from(const Points& from, std::size_t first, Points& to) {
+  const std::size_t end = padded_to_block(from.size());
+  const float* const source[3] = {from.x(), from.y(), from.z()};
+  float* const target[3] = {to.x(), to.y(), to.z()};
+  for (int c = 0; c < 3; ++c) std::copy(source[c] + first, source[c] + end, target[c] + first);
+}
+
+// Takes away what was appended to a copy of `whole`.
+void truncate(const Points& whole, Points& points) {
+  points.resize(whole.size());
+  copy_from(whole, whole.size(), points);
+}
+
+void truncate(const MultiresSurface& whole, MultiresSurface& surface) {
+  for (std::size_t k = 0; k < whole.levels.size(); ++k) {
+    truncate(whole.levels[k].position, surface.levels[k].position);
+    truncate(whole.levels[k].normal, surface.levels[k].normal);
   }
-  for (std::vector<float>& detail : surface.detail) detail.resize(count);
+  for (std::vector<float>& detail : surface.detail) detail.resize(whole.sample_count());
 }
 
 void truncate(ScaleField& field, std::size_t count) {
@@ -42,9 +56,7 @@ void truncate(NeighborGraph& graph, std::size_t count) {
 
 void copy_tail(const Points& from, std::size_t first, Points& to) {
   to.resize(from.size());
-  const float* const source[3] = {from.x(), from.y(), from.z()};
-  float* const target[3] = {to.x(), to.y(), to.z()};
-  for (int c = 0; c < 3; ++c) std::copy(source[c] + first, source[c] + from.size(), target[c] + first);
+  copy_from(from, first, to);
 }
 
 // Makes `room` as large as `from`, with its samples from `first` on.
@@ -126,7 +138,8 @@ class ResampledDrag::Work {
     if (context != nullptr && context->is_cancelled()) return cancelled_error();
     result.sampling = sampling_after(inserted, map, mapped.cells, tail_plan, preview, params, result.surface);
     if (!preview && params.resampling->collect > 0.0)
-      collect(all_field_, static_cast<float>(params.resampling->collect), result);
+      collect(all_field_, static_cast<float>(params.resampling->collect), result, context);
+    if (context != nullptr && context->is_cancelled()) return cancelled_error();
     return result;
   }
 
@@ -151,7 +164,7 @@ class ResampledDrag::Work {
 
   // The children in place of those of the frame before.
   void insert(const Inserted& inserted, const EditParams& params) {
-    truncate(all_rest_, before_);
+    truncate(*surface_, all_rest_);
     truncate(all_field_, before_);
     truncate(all_graph_, before_);
     append_children(inserted, params.level, all_rest_);

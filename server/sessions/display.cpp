@@ -124,6 +124,7 @@ Display::Frame Display::frame_since(std::uint64_t version, std::uint16_t attribu
   const auto columns = frame_columns(now->picture, level);
   auto bytes = unused_.take();
   if (bytes == nullptr) bytes = std::make_unique<protocol::FrameBytes>();
+  bytes->clear();  // nothing of it is wanted where more memory is needed
   if (since == 0) {
     encode_key_frame(now->layout, columns, state, attributes, *bytes);
   } else {

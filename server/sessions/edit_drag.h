@@ -18,6 +18,8 @@ class EditDrag {
   Result<SurfaceState> frame(const RestModel& rest, const SurfaceState& now, const RegionField& field,
                              const EditParams& params, ResamplingEffort effort,
                              const ExecutionContext& context);
+  /// Drops what frames with resampling share: it is as large as several surfaces.
+  void forget_resampled();
   /// Drops what was kept: the surface is another one, or memory is wanted.
   void forget();
 

@@ -25,7 +25,10 @@ ResampledDrag::ResampledDrag(const RestModel& rest, SurfaceState state, RegionFi
       kept->drag =
           std::make_unique<pointwright::ResampledDrag>(state_.surface, sampling, params, field_.t, regions);
     }
-    return kept->drag->frame(params, effort, {}, context);
+    auto drag = std::move(kept->drag);  // gone where the frame throws
+    auto frame = drag->frame(params, effort, {}, context);
+    kept->drag = std::move(drag);
+    return frame;
   };
 }
 

@@ -102,7 +102,8 @@ SharedMarks carried_marks(const SampleSet& from, const SharedMarks& marks, const
   Marks result = carried(*marks, sources, std::uint8_t{0});
   if (recorded != nullptr && recorded->size() == result.size()) {
     for (std::size_t i = 0; i < result.size(); ++i)
-      if (sources[i] == kNoSource) result[i] = (*recorded)[i];
+      if (sources[i] == kNoSource || from.cloud().id[sources[i]] != to.cloud().id[i])
+        result[i] = (*recorded)[i];
   }
   return std::make_shared<const Marks>(std::move(result));
 }

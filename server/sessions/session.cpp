@@ -423,6 +423,7 @@ Outcome<Done> Session::end_preview() {
   end_drag();
   return on_strand([this]() -> Outcome<Done> {
     if (shows_preview_) show_committed();
+    drag_.forget_resampled();
     return Done{};
   });
 }

@@ -4,6 +4,7 @@
 #include <draco/mesh/triangle_soup_mesh_builder.h>
 #include <draco/point_cloud/point_cloud_builder.h>
 
+#include <cmath>
 #include <limits>
 
 #include "engine/io/draco_codec.h"
@@ -115,6 +116,29 @@ TEST_CASE("integers at the ends of their types survive, alone and together") {
   for (const std::size_t count : {1U, 2U, 5U}) {
     const Cloud cloud = cloud_with_everything(count, Place::kNearZero, count).cloud;
     CHECK(difference(through(cloud, CloudFormat::kDraco).cloud, cloud) == "");
+  }
+}
+
+TEST_CASE("integers of any span survive, positions quantised or not") {
+  constexpr std::size_t kSamples = 300;
+  for (const std::uint32_t span : {1U << 20U, 1U << 29U, 1U << 30U, 2147483645U, 4294967295U}) {
+    Cloud cloud = in_caller_order(sphere(kSamples).cloud);
+    std::vector<std::uint32_t> values;
+    std::vector<std::int32_t> around_zero;
+    Random random(span);
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      const double part = i % 3 == 0 ? 0.0 : i % 3 == 1 ? 1.0 : random.uniform(0.0, 1.0);
+      values.push_back(static_cast<std::uint32_t>(part * span));
+      around_zero.push_back(static_cast<std::int32_t>(std::floor((part - 0.5) * span)));
+    }
+    cloud.scalars = {{"value", values}, {"around_zero", around_zero}};
+    for (const int bits : {0, 14}) {
+      CAPTURE(span);
+      CAPTURE(bits);
+      const Cloud again =
+          in_caller_order(through(cloud, CloudFormat::kDraco, {.draco_position_bits = bits}).cloud);
+      CHECK(again.scalars == cloud.scalars);
+    }
   }
 }
 

@@ -3,9 +3,12 @@
 
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <utility>
 #include <vector>
 
+#include "engine/multires/surface_delta.h"
+#include "engine/resampling/resampled_drag.h"
 #include "tests/resampling/resampling_support.h"
 #include "tests/support/all_machines.h"
 #include "tests/support/pulled_plane.h"
@@ -108,6 +111,36 @@ TEST_CASE("a second edit gives the same bytes with any number of threads too") {
                                                                   .angle_rad = 1.0},
                                                          {.collect = 0.6})),
                    ResamplingEffort::kExact);
+}
+
+TEST_CASE("frames of a drag are those of edits of their own, padding included, whatever frames came before") {
+  test::EditScene scene = pulled(41);  // whole blocks and one sample more
+  REQUIRE(scene.sampling->size() % kSimdBlock == 1);
+  ResampledDrag drag(std::make_shared<const MultiresSurface>(scene.surface), scene.sampling, scene.params,
+                     std::make_shared<const ScaleField>(scene.field), scene.regions);
+  const auto frame = [&](double height, ResamplingEffort effort, MultiresSurface room) {
+    scene.params.deformation = Translation{.vector = Vec3d(0.0, 0.0, height)};
+    auto result = drag.frame(scene.params, effort, std::move(room));
+    REQUIRE(result.ok());
+    return std::move(result).value();
+  };
+  // Histories compare the padding too.
+  const auto is_its_own = [&](const ResampledEdit& edit, ResamplingEffort effort) {
+    const ResampledEdit own = test::resampled(scene, effort);
+    return test::same_bytes(edit, own) && SurfaceDelta(edit.surface, own.surface).empty();
+  };
+  MultiresSurface room = frame(3.0, ResamplingEffort::kPreview, {}).surface;
+  for (const double height : {1e-3, 2.0, 1.0, 1e-3, 3.0}) {
+    for (const ResamplingEffort effort : {ResamplingEffort::kPreview, ResamplingEffort::kExact}) {
+      CAPTURE(height);
+      const ResampledEdit fresh = frame(height, effort, {});
+      CHECK(is_its_own(fresh, effort));
+      CHECK((fresh.inserted == 0) == (height == 1e-3));
+      ResampledEdit reused = frame(height, effort, std::move(room));
+      CHECK(is_its_own(reused, effort));
+      room = std::move(reused.surface);
+    }
+  }
 }
 
 TEST_CASE("a preview inserts no more than comes in time, and collects nothing") {

@@ -319,6 +319,8 @@ export class TransformEditor {
   private again(): void {
     const whole = this.whole;
     const gains = this.changesDetail ? this.gains_.join(" ") : "";
+    // A refusal of how many samples there would be was of other numbers.
+    if (this.resamplingFault_?.about === null) this.resamplingFault_ = null;
     if (whole) this.preview.want(whole, { blend: this.blend_, gains });
     this.tell();
   }

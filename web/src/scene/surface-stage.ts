@@ -2,6 +2,8 @@ import type { SurfaceBlock, SurfaceLayout } from "./sample-surface";
 
 /** How much more room is made than a frame needs that is larger than all before it. */
 const GROWTH = 1.5;
+/** Room that is so many times what a frame needs goes back: a large preview must not keep its memory for ever. */
+const MOST_SLACK = 4;
 
 /** Buffers that one frame at a time is kept in. */
 export interface StagedSurface {
@@ -93,8 +95,10 @@ export class SurfaceStage<Surface extends StagedSurface> {
   }
 
   private madeFor(surface: Surface | null, layout: SurfaceLayout): Surface {
-    if (surface?.begin(layout)) return surface;
-    const most = Math.max(this.front_?.room ?? 0, this.back_?.room ?? 0);
+    const wasteful = (room: number) => room > MOST_SLACK * layout.blockCount;
+    if (surface && !wasteful(surface.room) && surface.begin(layout)) return surface;
+    const known = Math.max(this.front_?.room ?? 0, this.back_?.room ?? 0);
+    const most = wasteful(known) ? 0 : known;
     surface?.dispose();
     const grown = most === 0 ? 0 : Math.ceil(GROWTH * most);
     return this.make_(layout, layout.blockCount <= most ? most : Math.max(layout.blockCount, grown));

@@ -92,6 +92,17 @@ test("frames of a drag whose counts differ take turns in two sets of buffers, wh
   expect(made.filter(({ disposed }) => !disposed)).toEqual([stage.front]);
 });
 
+test("room that a large preview took goes back once frames are small again", () => {
+  const { stage, made, frame } = bench();
+  frame(500);
+  frame(50_000);
+  frame(40_000);
+  frame(500);
+  frame(500, true);
+  expect(stage.front?.room).toBe(5);
+  expect(made.filter(({ disposed }) => !disposed)).toEqual([stage.front]);
+});
+
 test("a delta goes to the frame on the screen, and to no other one", () => {
   const { stage, made, frame } = bench();
   frame(300, true);
