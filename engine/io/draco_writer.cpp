@@ -172,7 +172,7 @@ draco::Status encode(draco::PointCloud& cloud, int position, int position_bits, 
   if (position_bits > 0) encoder.SetAttributeQuantization(position, position_bits);
   if (coding == Coding::kPlain) {
     encoder.SetUseBuiltInAttributeCompression(false);
-    const draco::Status set = encoder.SetAttributePredictionScheme(position, draco::PREDICTION_NONE);
+    draco::Status set = encoder.SetAttributePredictionScheme(position, draco::PREDICTION_NONE);
     if (!set.ok()) return set;
   }
   return encoder.EncodeToBuffer(&buffer);

@@ -204,7 +204,7 @@ void SurfaceDelta::apply(MultiresSurface& surface) const {
 }
 
 std::uint64_t SurfaceDelta::memory() const {
-  std::uint64_t bytes = columns_.capacity() * sizeof(Column) + tail_.capacity() * sizeof(tail_[0]);
+  std::uint64_t bytes = columns_.capacity() * sizeof(Column) + tail_.capacity() * sizeof(std::vector<float>);
   for (const std::vector<float>& column : tail_) bytes += column.capacity() * sizeof(float);
   for (const Column& column : columns_) {
     bytes += column.changed.capacity() * sizeof(std::uint64_t);

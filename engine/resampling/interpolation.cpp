@@ -208,7 +208,7 @@ void append_attributes(const std::vector<ZombieWeights>& weights, Cloud& cloud) 
       for (std::size_t channel = 0; channel < color.size(); ++channel) {
         const double value = clamped(
             weights[c], [&](std::uint32_t i) { return static_cast<double>(cloud.color[i][channel]); });
-        color[channel] = static_cast<std::uint8_t>(value + 0.5);
+        color[channel] = static_cast<std::uint8_t>(std::lround(value));
       }
       return color;
     });

@@ -20,12 +20,14 @@ Result<void> SampleRoom::take(std::uint64_t samples) {
   const std::lock_guard lock(mutex_);
   if (samples <= samples_) return {};
   if (memory == nullptr) return cancelled_error();
-  if (!memory->grow_by((samples - samples_) * bytes_each_))
+  if (!memory->grow_by((samples - samples_) * bytes_each_)) {
+    const std::uint64_t most = samples_ + memory->left() / bytes_each_;
     return Error{.code = ErrorCode::kTooLarge,
                  .message = "the memory for sessions has no room for " + std::to_string(samples) + " samples",
                  .field = "resampling.max_samples",
-                 .limit = static_cast<double>(samples_ + memory->left() / bytes_each_),
+                 .limit = static_cast<double>(most),
                  .actual = static_cast<double>(samples)};
+  }
   samples_ = samples;
   return {};
 }
