@@ -4,25 +4,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "engine/core/gather.h"
+
 namespace pointwright {
 namespace {
-
-template <typename T>
-std::vector<T> gather(const std::vector<T>& column, const std::vector<std::uint32_t>& order) {
-  std::vector<T> result;
-  if (column.empty()) return result;
-  result.reserve(order.size());
-  for (const std::uint32_t i : order) result.push_back(column[i]);
-  return result;
-}
-
-Points gather(const Points& column, const std::vector<std::uint32_t>& order) {
-  Points result;
-  if (column.empty()) return result;
-  result.resize(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) result.set(i, column[order[i]]);
-  return result;
-}
 
 Error malformed(const char* column, std::size_t expected, std::size_t actual) {
   return Error{.code = ErrorCode::kMalformedData,
@@ -46,17 +31,17 @@ Cloud permuted(const Cloud& cloud, const std::vector<std::uint32_t>& order) {
   result.origin = cloud.origin;
   result.color_has_alpha = cloud.color_has_alpha;
   result.position_is_double = cloud.position_is_double;
-  result.position = gather(cloud.position, order);
-  result.normal = gather(cloud.normal, order);
-  result.color = gather(cloud.color, order);
-  result.texcoord = gather(cloud.texcoord, order);
-  result.id = gather(cloud.id, order);
-  result.exact_position = gather(cloud.exact_position, order);
+  result.position = gathered(cloud.position, order);
+  result.normal = gathered(cloud.normal, order);
+  result.color = gathered(cloud.color, order);
+  result.texcoord = gathered(cloud.texcoord, order);
+  result.id = gathered(cloud.id, order);
+  result.exact_position = gathered(cloud.exact_position, order);
   result.scalars.reserve(cloud.scalars.size());
   for (const ScalarAttribute& scalar : cloud.scalars) {
     result.scalars.push_back(
         {scalar.name,
-         std::visit([&](const auto& values) { return ScalarAttribute::Values(gather(values, order)); },
+         std::visit([&](const auto& values) { return ScalarAttribute::Values(gathered(values, order)); },
                     scalar.values)});
   }
   return result;

@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "engine/core/gather.h"
 #include "engine/core/parallel.h"
 #include "engine/resampling/cells.h"
 #include "engine/spatial/kd_tree.h"
@@ -152,12 +153,6 @@ class Collection {
   bool inserted_alone_ = false;
 };
 
-Points gathered(const Points& column, const std::vector<std::uint32_t>& order) {
-  Points result(order.size());
-  for (std::size_t m = 0; m < order.size(); ++m) result.set(m, column[order[m]]);
-  return result;
-}
-
 // The row of sample i without who is gone: its neighbours, and where these are too few, theirs. False where
 // too few are left nearby to say who is nearest.
 bool fill_row(const NeighborGraph& graph, const std::vector<std::uint8_t>& gone, const Points& position,
@@ -231,15 +226,6 @@ NeighborGraph survivors_graph(const NeighborGraph& graph, const std::vector<std:
     if (searched[m] != 0) rows.push_back(static_cast<std::uint32_t>(m));
   search_rows(rows, gathered(position, order), left);
   return left;
-}
-
-template <typename T>
-std::vector<T> gathered(const std::vector<T>& column, const std::vector<std::uint32_t>& order) {
-  std::vector<T> result;
-  if (column.empty()) return result;
-  result.reserve(order.size());
-  for (const std::uint32_t i : order) result.push_back(column[i]);
-  return result;
 }
 
 // The parents, where an inserted one is gone that one's own: whoever stays descends from somebody.
