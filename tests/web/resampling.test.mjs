@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { waitForIdle } from "../../web/scripts/browser.mjs";
-import { openEditor, paintCaps, startAroundTests, timeout, waitMs } from "./support.mjs";
+import { openEditor, paintCaps, pixelsOf, startAroundTests, timeout, waitMs } from "./support.mjs";
 
 startAroundTests();
 
@@ -21,18 +21,12 @@ async function holes(page) {
   const [right, bottom] = at(0.6, -0.25);
   const clip = { x: left, y: top, width: right - left, height: bottom - top };
   const shot = await page.screenshot({ clip, timeout: waitMs });
-  return page.evaluate(async (data) => {
-    const bytes = Uint8Array.from(atob(data), (character) => character.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
-    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-    const context = canvas.getContext("2d");
-    context.drawImage(bitmap, 0, 0);
-    const { data: pixels } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+  return (await pixelsOf(page, shot)).evaluate(({ data: pixels }) => {
     let dark = 0;
     for (let i = 0; i < pixels.length; i += 4)
       if (Math.max(pixels[i], pixels[i + 1], pixels[i + 2]) < 60) dark++;
     return dark;
-  }, shot.toString("base64"));
+  });
 }
 
 test("a pull with resampling: more samples in the preview and after it, undone and redone", {

@@ -118,21 +118,27 @@ export async function drag(page, places, steps = 4) {
   await page.mouse.up();
 }
 
-/** What the canvas shows, counted in the browser: blue, red and surface pixels, and the surface's extent in fractions. */
-export async function countPixels(page) {
-  const shot = await page.locator("canvas.viewport-canvas").screenshot({ timeout: waitMs });
-  return page.evaluate(async (data) => {
-    const bytes = Uint8Array.from(atob(data), (character) => character.charCodeAt(0));
+/** A handle on {data, width, height} of a screenshot, in the browser: four bytes a pixel. */
+export function pixelsOf(page, shot) {
+  return page.evaluateHandle(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
     const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
     const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
     const context = canvas.getContext("2d");
     context.drawImage(bitmap, 0, 0);
-    const { data: pixels } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    return context.getImageData(0, 0, bitmap.width, bitmap.height);
+  }, shot.toString("base64"));
+}
+
+/** What the canvas shows, counted in the browser: blue, red and surface pixels, and the surface's extent in fractions. */
+export async function countPixels(page) {
+  const shot = await page.locator("canvas.viewport-canvas").screenshot({ timeout: waitMs });
+  return (await pixelsOf(page, shot)).evaluate(({ data: pixels, width, height }) => {
     const result = { blue: 0, red: 0, surface: 0, top: 1, bottom: 0, left: 1, right: 0, redY: 0, redX: 0 };
-    for (let y = 0; y < bitmap.height; y++) {
+    for (let y = 0; y < height; y++) {
       // The tools lie over the left edge.
-      for (let x = 70; x < bitmap.width; x++) {
-        const at = 4 * (y * bitmap.width + x);
+      for (let x = 70; x < width; x++) {
+        const at = 4 * (y * width + x);
         const [r, g, b] = [pixels[at], pixels[at + 1], pixels[at + 2]];
         const blue = b > 70 && b > 1.6 * r && b > 1.2 * g;
         const red = r > 70 && r > 1.7 * g && r > 1.7 * b;
@@ -141,15 +147,15 @@ export async function countPixels(page) {
         if (blue) result.blue++;
         if (red) {
           result.red++;
-          result.redX += x / bitmap.width;
-          result.redY += y / bitmap.height;
+          result.redX += x / width;
+          result.redY += y / height;
         }
         if (!(blue || red || clay)) continue;
         result.surface++;
-        result.top = Math.min(result.top, y / bitmap.height);
-        result.bottom = Math.max(result.bottom, y / bitmap.height);
-        result.left = Math.min(result.left, x / bitmap.width);
-        result.right = Math.max(result.right, x / bitmap.width);
+        result.top = Math.min(result.top, y / height);
+        result.bottom = Math.max(result.bottom, y / height);
+        result.left = Math.min(result.left, x / width);
+        result.right = Math.max(result.right, x / width);
       }
     }
     if (result.red > 0) {
@@ -157,7 +163,7 @@ export async function countPixels(page) {
       result.redY /= result.red;
     }
     return result;
-  }, shot.toString("base64"));
+  });
 }
 
 /** Fails where the page reported an error or broke the content security policy. */

@@ -102,8 +102,8 @@ async function pulledPlane(url) {
   await commit(url, session, { ...pull, resampling: {} });
   await clear();
   await picture(session.id, "resampled");
-  const file7 = await call(url, "GET", `${session.path}/samples?format=ply`);
-  const blurred = averaged(new Uint8Array(await file7.arrayBuffer()), samples, 10);
+  const exported = await call(url, "GET", `${session.path}/samples?format=ply`);
+  const blurred = averaged(new Uint8Array(await exported.arrayBuffer()), samples, 10);
   const other = await upload(url, "Averaged", ply, blurred);
   const shown = await openSession(url, { cloud: other.id, name: "Figure 7, averaged", scales: [0.02] });
   await picture(shown.id, "averaged");

@@ -7,7 +7,7 @@ const readers = {
   float: ["getFloat32", 4], float32: ["getFloat32", 4], double: ["getFloat64", 8], float64: ["getFloat64", 8],
 };
 
-/** Where the vertices of a file stand: {count, start, stride, columns, view}. */
+/** Where the vertices of a file stand: {count, stride, columns, view}. */
 export function openPly(bytes) {
   const end = "end_header\n";
   const headerLength =
@@ -34,7 +34,7 @@ export function openPly(bytes) {
   if (bytes.length < headerLength + count * stride) throw new Error("the PLY file is cut short");
 
   const view = new DataView(bytes.buffer, bytes.byteOffset + headerLength);
-  return { count, start: headerLength, stride, columns, view };
+  return { count, stride, columns, view };
 }
 
 /** Answers {count, positions: Float64Array(3 * count)}: float32 coordinates are exact in it. */
