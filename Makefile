@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build build-tests viewer sample demo figures serve test bench bench-peers sanitize tidy format check-arm64 clean
+.PHONY: help build build-tests install viewer sample demo figures serve test battery bench bench-peers sanitize tidy format check-arm64 clean
 
 release := build/release
 daemon := $(release)/server/pointwrightd
@@ -77,15 +77,20 @@ serve: ## run the editor on http://$(HOST):$(PORT) until Ctrl-C
 	@exec $(daemon) --host $(HOST) --port $(PORT) --web web/dist --sample "$(dragon)=Stanford dragon"
 
 test: ## every check and every test; the last line counts them (LANES="format cpp" for some)
-	@.ci/setup build web view lint
+	@.ci/setup build web view clients lint
 	@mkdir -p build
 	@node tests/run.mjs $(LANES)
 
-bench: ## measure; table on the terminal, numbers in build/bench.json
-	@.ci/setup build
+battery: build ## the reliability battery at full length, a quarter of an hour: SCALE=0.1 for less, SEED=2 for other bytes
+	@.ci/setup web
+	@node tests/battery/run.mjs --scale $(or $(SCALE),1) --seed $(or $(SEED),1) $(PARTS)
+
+bench: ## measure; table on the terminal, numbers in build/bench.json, of the service under load in build/bench-load.json
+	@.ci/setup build web
 	@mkdir -p build
-	@$(call compile,release,pointwright_bench)
+	@$(call compile,release,pointwright_bench pointwrightd)
 	@$(release)/tests/bench/pointwright_bench --out build/bench.json
+	@node tests/bench/load.mjs --out build/bench-load.json
 
 bench-peers: ## measure beside CGAL, PCL, Open3D and nanoflann (installs them); numbers in build/bench-peers.json
 	@.ci/setup build peers
@@ -113,6 +118,11 @@ format: ## put every source file into its canonical form
 check-arm64: ## compile the engine for arm64 (nothing is run)
 	@.ci/setup build arm64
 	@tests/gates/arm64
+
+# DESTDIR and PREFIX as usual. Settings and log rotation are examples in PREFIX/share/pointwright/examples.
+PREFIX ?= /usr
+install: build viewer ## put the daemon, the tool, the viewer, the manual and the unit below PREFIX (/usr)
+	@cmake --install $(release) --prefix $(PREFIX)
 
 clean: ## remove everything that was built; installed packages stay
 	rm -rf build web/dist

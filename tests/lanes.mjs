@@ -7,7 +7,7 @@ import { headers } from "./gates/headers.mjs";
 import { hygiene } from "./gates/hygiene.mjs";
 import { readme } from "./gates/readme.mjs";
 import { tidy } from "./gates/tidy.mjs";
-import { jobs, root, run, trackedFiles, verdict } from "./support/process.mjs";
+import { jobs, root, run, together, trackedFiles, verdict } from "./support/process.mjs";
 
 const web = resolve(root, "web");
 const release = resolve(root, "build/release");
@@ -72,15 +72,52 @@ async function webUnit() {
   return { passed: numPassedTests, failed: success ? 0 : Math.max(1, numFailedTests), output };
 }
 
-async function browser() {
-  const files = await trackedFiles(/^tests\/web\/.*\.test\.(mjs|js)$/);
-  if (files.length === 0) return { passed: 0, failed: 1, output: "    tests/web holds no *.test.mjs" };
+async function nodeTests(pattern, folder) {
+  const files = await trackedFiles(pattern);
+  if (files.length === 0) return { passed: 0, failed: 1, output: `    ${folder} holds no *.test.mjs` };
   const { status, output } = await run("node", ["--test", "--test-reporter=tap", ...files], {
     timeoutSeconds: 900,
   });
   const total = (what) => Number(output.match(new RegExp(`^# ${what} (\\d+)$`, "m"))?.[1] ?? 0);
   const failed = total("fail") + total("cancelled");
   return { passed: total("pass"), failed: status !== 0 && failed === 0 ? 1 : failed, output };
+}
+
+/** The reliability battery at a fiftieth of its length; each check is a test. */
+async function battery() {
+  const { status, output } = await run("node", ["tests/battery/run.mjs", "--scale", "0.02"], {
+    timeoutSeconds: 600,
+  });
+  const [, passed, failed] = output.match(/^(\d+) checks passed, (\d+) failed$/m) ?? [null, 0, 1];
+  return { passed: Number(passed), failed: Math.max(Number(failed), status === 0 ? 0 : 1), output };
+}
+
+/** The clients against daemons of their own: Python and the command line (Debian's Python), what pyflakes and mypy find; TypeScript. */
+async function clients() {
+  const python = process.env.PYTHON ?? "/usr/bin/python3";
+  const checks = await Promise.all([
+    run(python, ["-m", "pyflakes", "clients/python", "tests/clients"]),
+    run(python, [
+      "-m",
+      "mypy",
+      "--no-incremental",
+      "--python-version",
+      "3.9",
+      "clients/python/pointwright.py",
+    ]),
+  ]);
+  const found = together(checks.map(({ status, output }) => verdict(status === 0 ? [] : [output.trim()])));
+  const { status, output } = await run(python, ["-m", "unittest", "discover", "-s", "tests/clients"], {
+    timeoutSeconds: 900,
+    env: { PYTHONDONTWRITEBYTECODE: "1" },
+  });
+  const total = Number(output.match(/^Ran (\d+) tests? in/m)?.[1] ?? 0);
+  const count = (what) => Number(output.match(new RegExp(`\\b${what}=(\\d+)`))?.[1] ?? 0);
+  const bad = count("failures") + count("errors");
+  const failed = status !== 0 && bad === 0 ? 1 : bad;
+  const tests = { passed: Math.max(0, total - failed), failed, output };
+  const typescript = await nodeTests(/^tests\/clients\/.*\.test\.mjs$/, "tests/clients");
+  return together([found, tests, typescript]);
 }
 
 export const lanes = [
@@ -92,8 +129,14 @@ export const lanes = [
   { name: "headers", about: "every header compiles alone", run: headers },
   { name: "cpp", about: "the C++ tests", run: cpp },
   { name: "web", about: "the viewer's unit tests", run: webUnit },
+  { name: "clients", about: "clients: Python, command line, TypeScript", run: clients },
   { name: "sample", about: "the Stanford dragon is converted", run: () => make("sample") },
   { name: "readme", about: "the README's shell lines run", run: readme },
-  { name: "browser", about: "the viewer in a real browser", run: browser },
+  {
+    name: "browser",
+    about: "the viewer in a real browser",
+    run: () => nodeTests(/^tests\/web\/.*\.test\.(mjs|js)$/, "tests/web"),
+  },
+  { name: "battery", about: "hostile bytes, slow clients and load, in short", run: battery },
   { name: "tidy", about: "clang-tidy", run: tidy },
 ];

@@ -9,7 +9,7 @@
 namespace pointwright {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x31424c4254575054ULL;  // changes with the layout
+constexpr std::uint64_t kMagic = 0x32424c4254575054ULL;  // changes with the layout
 constexpr std::uint64_t kMostScalars = 4096;
 constexpr std::uint64_t kMostStrings = 65536;
 constexpr std::uint64_t kLongestString = 4096;
@@ -118,7 +118,13 @@ std::uint32_t flags_of(const Cloud& cloud) {
 
 void write_report(const ImportReport& report, Writer& out) {
   out.value(static_cast<std::uint32_t>(report.format));
-  out.value(static_cast<std::uint32_t>((report.from_mesh ? 1U : 0U) | (report.position_is_double ? 2U : 0U)));
+  out.value(static_cast<std::uint32_t>((report.from_mesh ? 1U : 0U) | (report.position_is_double ? 2U : 0U) |
+                                       (report.grid ? 4U : 0U)));
+  out.value(static_cast<std::uint32_t>(report.normals));
+  if (report.grid) {
+    out.vector(report.grid->scale);
+    out.vector(report.grid->offset);
+  }
   out.text(report.encoding);
   for (const std::uint64_t count :
        {report.declared_count, report.sample_count, report.dropped_non_finite, report.duplicate_count}) {
@@ -133,9 +139,16 @@ void write_report(const ImportReport& report, Writer& out) {
 bool read_report(Reader& in, ImportReport& report) {
   std::uint32_t format = 0;
   std::uint32_t flags = 0;
-  if (!in.value(format) || format > static_cast<std::uint32_t>(CloudFormat::kXyz)) return false;
+  if (!in.value(format) || format > static_cast<std::uint32_t>(kLastCloudFormat)) return false;
   report.format = static_cast<CloudFormat>(format);
-  if (!in.value(flags) || flags > 3) return false;
+  std::uint32_t normals = 0;
+  if (!in.value(flags) || flags > 7) return false;
+  if (!in.value(normals) || normals > static_cast<std::uint32_t>(NormalQuality::kScaled)) return false;
+  report.normals = static_cast<NormalQuality>(normals);
+  if ((flags & 4U) != 0) {
+    PositionGrid& grid = report.grid.emplace();
+    if (!in.vector(grid.scale) || !in.vector(grid.offset)) return false;
+  }
   report.from_mesh = (flags & 1U) != 0;
   report.position_is_double = (flags & 2U) != 0;
   const bool read = in.text(report.encoding) && in.value(report.declared_count) &&

@@ -6,6 +6,9 @@
 #include "engine/io/columns.h"
 #include "engine/io/decoded_cloud.h"
 #include "engine/io/draco_codec.h"
+#include "engine/io/las.h"
+#include "engine/io/obj.h"
+#include "engine/io/pcd.h"
 #include "engine/io/ply.h"
 #include "engine/io/xyz.h"
 
@@ -18,10 +21,10 @@ struct Signature {
 };
 
 // What people send that is not for us, by its first bytes: they learn what to do instead.
-constexpr std::array<Signature, 9> kForeign{{
-    {"LASF", "LAS and LAZ files are not read: convert to PLY first"},
-    {"ASTM-E57", "E57 files are not read: convert to PLY first"},
-    {"# .PCD", "PCD files are not read: convert to PLY first"},
+constexpr std::array<Signature, 7> kForeign{{
+    {"ASTM-E57",
+     "E57 files are not read: convert to LAS or PLY first, with CloudCompare or 'pdal translate' for "
+     "example"},
     {"OFF", "OFF files are not read: convert to PLY first"},
     {"\x1f\x8b", "the bytes are gzip-compressed: send them unpacked"},
     {"\x28\xb5\x2f\xfd", "the bytes are zstd-compressed: send them unpacked"},
@@ -48,11 +51,14 @@ Result<CloudFormat> detect_format(std::span<const std::byte> bytes) {
       std::string_view("\r\n \t").find(text[3]) != std::string_view::npos) {
     return CloudFormat::kPly;
   }
+  if (text.starts_with("LASF")) return CloudFormat::kLas;
   for (const Signature& foreign : kForeign) {
     if (text.starts_with(foreign.start)) return unsupported(foreign.advice);
   }
+  if (looks_like_pcd(bytes)) return CloudFormat::kPcd;
+  if (looks_like_obj(bytes)) return CloudFormat::kObj;
   if (looks_like_xyz(bytes)) return CloudFormat::kXyz;
-  return unsupported("the bytes are neither Draco, nor PLY, nor lines of numbers");
+  return unsupported("the bytes are neither Draco, PLY, LAS, PCD or OBJ, nor lines of numbers");
 }
 
 std::string_view format_name(CloudFormat format) {
@@ -61,10 +67,20 @@ std::string_view format_name(CloudFormat format) {
       return "draco";
     case CloudFormat::kPly:
       return "ply";
+    case CloudFormat::kObj:
+      return "obj";
+    case CloudFormat::kPcd:
+      return "pcd";
+    case CloudFormat::kLas:
+      return "las";
     case CloudFormat::kXyz:
       break;
   }
   return "xyz";
+}
+
+bool is_writable(CloudFormat format) {
+  return format != CloudFormat::kObj && format != CloudFormat::kPcd;
 }
 
 Result<ImportedCloud> decode_cloud(std::span<const std::byte> bytes, CloudFormat format,
@@ -75,6 +91,12 @@ Result<ImportedCloud> decode_cloud(std::span<const std::byte> bytes, CloudFormat
       return read_draco(bytes, params);
     case CloudFormat::kPly:
       return read_ply(bytes, params);
+    case CloudFormat::kObj:
+      return read_obj(bytes, params);
+    case CloudFormat::kPcd:
+      return read_pcd(bytes, params);
+    case CloudFormat::kLas:
+      return read_las(bytes, params);
     case CloudFormat::kXyz:
       break;
   }
@@ -93,6 +115,9 @@ Result<std::vector<std::byte>> write_cloud(const Cloud& cloud, CloudFormat forma
   if (cloud.size() == 0)
     return Error{.code = ErrorCode::kEmptyCloud, .message = "there are no samples", .field = {}};
   if (auto valid = validate(cloud); !valid) return valid.error();
+  if (!is_writable(format)) {
+    return unsupported(std::string(format_name(format)) + " files are read, not written");
+  }
   const bool quantised = params.draco_position_bits != 0;
   if (quantised && (params.draco_position_bits < 8 || params.draco_position_bits > 30)) {
     return Error{.code = ErrorCode::kInvalidArgument,
@@ -108,8 +133,10 @@ Result<std::vector<std::byte>> write_cloud(const Cloud& cloud, CloudFormat forma
                  .message = "only Draco quantises positions",
                  .field = "draco_position_bits"};
   }
-  if (params.ascii && format == CloudFormat::kDraco) {
-    return Error{.code = ErrorCode::kInvalidArgument, .message = "Draco has no text form", .field = "ascii"};
+  if (params.ascii && (format == CloudFormat::kDraco || format == CloudFormat::kLas)) {
+    const std::string name = format == CloudFormat::kLas ? "LAS" : "Draco";
+    return Error{
+        .code = ErrorCode::kInvalidArgument, .message = name + " has no text form", .field = "ascii"};
   }
   const ExportView view(cloud, params.caller_order);
   switch (format) {
@@ -117,6 +144,10 @@ Result<std::vector<std::byte>> write_cloud(const Cloud& cloud, CloudFormat forma
       return write_draco(view, params.draco_position_bits);
     case CloudFormat::kPly:
       return write_ply(view, params.ascii);
+    case CloudFormat::kLas:
+      return write_las(view, params.grid);
+    case CloudFormat::kObj:
+    case CloudFormat::kPcd:
     case CloudFormat::kXyz:
       break;
   }

@@ -95,7 +95,14 @@ bool take_normals_as(ColumnSet& columns, ImportedCloud& result) {
                                                   columns.find_as<T>("nz")};
   if (from[0] == nullptr || from[1] == nullptr || from[2] == nullptr) return false;
   Points normals(from[0]->size());
+  const Points& position = result.cloud.position;
+  bool all_unit = true;
   for (std::size_t i = 0; i < normals.size(); ++i) {
+    // Samples that stand nowhere are refused or dropped later: what normal they have does not matter.
+    if (!std::isfinite(position.x()[i] + position.y()[i] + position.z()[i])) {
+      normals.set(i, Vec3f::UnitZ());
+      continue;
+    }
     const Vec3d exact(static_cast<double>((*from[0])[i]), static_cast<double>((*from[1])[i]),
                       static_cast<double>((*from[2])[i]));
     const double length = exact.stableNorm();
@@ -105,10 +112,12 @@ bool take_normals_as(ColumnSet& columns, ImportedCloud& result) {
       return true;
     }
     const bool unit = std::abs(length - 1.0) <= static_cast<double>(kUnitTolerance);
+    all_unit = all_unit && unit;
     normals.set(i, (unit ? exact : Vec3d(exact / length)).cast<float>());
   }
   for (const char* name : {"nx", "ny", "nz"}) columns.remove(name);
   result.cloud.normal = std::move(normals);
+  result.report.normals = all_unit ? NormalQuality::kUnit : NormalQuality::kScaled;
   return true;
 }
 
@@ -167,6 +176,21 @@ Result<ImportedCloud> assemble_cloud(std::vector<ScalarAttribute> columns, Impor
   result.cloud.id.resize(result.cloud.size());
   std::iota(result.cloud.id.begin(), result.cloud.id.end(), 0U);
   return result;
+}
+
+Result<Cloud> with_attributes(Cloud cloud, const std::vector<std::string>& names) {
+  std::set<std::string> wanted(names.begin(), names.end());
+  if (cloud.has_normals() && wanted.erase("normal") == 0) cloud.normal = Points();
+  if (cloud.has_colors() && wanted.erase("color") == 0) {
+    cloud.color.clear();
+    cloud.color_has_alpha = false;
+  }
+  if (!cloud.texcoord.empty() && wanted.erase("texcoord") == 0) cloud.texcoord.clear();
+  std::erase_if(cloud.scalars, [&](const ScalarAttribute& scalar) { return wanted.erase(scalar.name) == 0; });
+  if (wanted.empty()) return cloud;
+  return Error{.code = ErrorCode::kInvalidArgument,
+               .message = "the cloud has no attribute " + quoted(*wanted.begin()),
+               .field = "attributes"};
 }
 
 ExportView::ExportView(const Cloud& cloud, bool caller_order) : cloud_(cloud), order_(cloud.size()) {

@@ -22,6 +22,10 @@ namespace pointwright {
 /// Errors: kMalformedData (no x, y or z; a name twice), kEmptyCloud
 Result<ImportedCloud> assemble_cloud(std::vector<ScalarAttribute> columns, ImportReport report);
 
+/// The cloud with no attributes but these: "normal", "color", "texcoord" and scalars by name.
+/// Errors: kInvalidArgument (it has none of that name; field "attributes")
+Result<Cloud> with_attributes(Cloud cloud, const std::vector<std::string>& names);
+
 /// How a writer sees a cloud: rows in the order asked for, unclashing names, and the precision that positions
 /// need.
 class ExportView {

@@ -8,6 +8,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/io/decoded_cloud.h"
+#include "engine/io/import_report.h"
 #include "engine/spatial/coherent_order.h"
 
 namespace pointwright {
@@ -217,15 +218,6 @@ std::uint64_t count_duplicates(const Cloud& cloud) {
   return duplicates;
 }
 
-void list_attributes(ImportedCloud& imported) {
-  auto& names = imported.report.attributes;
-  names.clear();
-  if (imported.cloud.has_normals()) names.emplace_back("normal");
-  if (imported.cloud.has_colors()) names.emplace_back("color");
-  if (!imported.cloud.texcoord.empty()) names.emplace_back("texcoord");
-  for (const ScalarAttribute& scalar : imported.cloud.scalars) names.push_back(scalar.name);
-}
-
 }  // namespace
 
 Result<ImportedCloud> finish_cloud(ImportedCloud decoded, const ImportParams& params) {
@@ -246,6 +238,7 @@ Result<ImportedCloud> finish_cloud(ImportedCloud decoded, const ImportParams& pa
     return Error{
         .code = ErrorCode::kNonFinite, .message = "the file's origin is not finite", .field = "origin"};
   }
+  const Vec3d file_origin = cloud.origin;
   Range range = range_of(cloud);
   if (!range.is_finite) {
     if (auto finite = drop_or_refuse_non_finite(imported, params); !finite) return finite.error();
@@ -265,7 +258,7 @@ Result<ImportedCloud> finish_cloud(ImportedCloud decoded, const ImportParams& pa
   imported.report.position_is_double = cloud.position_is_double;
   imported.report.bounds_min = range.min;
   imported.report.bounds_max = range.max;
-  list_attributes(imported);
+  complete_report(imported, file_origin);
   return decoded;
 }
 

@@ -7,7 +7,7 @@
 namespace pointwright {
 namespace {
 
-std::string_view type_name(ScalarType type) {
+std::string_view ply_type(ScalarType type) {
   constexpr std::array<std::string_view, 8> kNames{"char", "uchar", "short", "ushort",
                                                    "int",  "uint",  "float", "double"};
   return kNames[static_cast<std::size_t>(type)];
@@ -52,7 +52,7 @@ std::string header_of(const ExportView& view, bool ascii) {
   text += encoding_name(ascii ? PlyEncoding::kAscii : PlyEncoding::kBinaryLittleEndian);
   text += " 1.0\ncomment Written by Pointwright\nelement vertex " + std::to_string(view.size()) + "\n";
   const auto property = [&](ScalarType type, const std::string& name) {
-    text += "property " + std::string(type_name(type)) + " " + name + "\n";
+    text += "property " + std::string(ply_type(type)) + " " + name + "\n";
   };
   for (const char* name : {"x", "y", "z"})
     property(view.needs_double() ? ScalarType::kDouble : ScalarType::kFloat, name);

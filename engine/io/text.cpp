@@ -82,6 +82,12 @@ std::size_t size_of(ScalarType type) {
   return kSizes[static_cast<std::size_t>(type)];
 }
 
+std::string_view type_name(ScalarType type) {
+  constexpr std::array<std::string_view, 8> kNames{"int8",  "uint8",  "int16",   "uint16",
+                                                   "int32", "uint32", "float32", "float64"};
+  return kNames[static_cast<std::size_t>(type)];
+}
+
 ScalarAttribute::Values make_values(ScalarType type) {
   switch (type) {
     case ScalarType::kInt8:
@@ -153,6 +159,12 @@ bool is_float_text(double value) {
   return again == value;
 }
 
+ScalarAttribute::Values narrowed(std::vector<double> column) {
+  if (std::all_of(column.begin(), column.end(), is_float_text))
+    return std::vector<float>(column.begin(), column.end());
+  return column;
+}
+
 std::string clean_text(std::string_view text) {
   std::string result;
   while (!text.empty()) {
@@ -191,6 +203,23 @@ std::string lower_case(std::string_view text) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
   return result;
+}
+
+std::string_view text_of(std::span<const std::byte> bytes) {
+  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  return text;
+}
+
+bool LineReader::next(TextLine& line) {
+  if (at_ >= text_.size()) return false;
+  std::size_t end = std::min(text_.find('\n', at_), text_.size());
+  if (next_cr_ < at_ || next_cr_ == 0) next_cr_ = std::min(text_.find('\r', at_), text_.size());
+  end = std::min(end, next_cr_);
+  line = {text_.substr(at_, end - at_), ++number_};
+  const bool pair = end + 1 < text_.size() && text_[end] == '\r' && text_[end + 1] == '\n';
+  at_ = end + (pair ? 2 : 1);
+  return true;
 }
 
 std::string_view take_word(std::string_view& line) {

@@ -1,9 +1,12 @@
 #pragma once
 // Words and numbers of text formats: locale-free, bounded by the span, exact to the last bit.
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/core/cloud.h"
 
@@ -13,6 +16,8 @@ namespace pointwright {
 enum class ScalarType : std::uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
 
 std::size_t size_of(ScalarType type);
+
+std::string_view type_name(ScalarType type);  ///< "int8", "uint8", … "float32", "float64"
 
 /// The column type that a ScalarAttribute holds.
 inline ScalarType type_of(const ScalarAttribute& column) {
@@ -41,6 +46,9 @@ void append_number(std::string& text, std::int64_t value);
 /// same number. ("0.1" is; "5648349.895035" is not.)
 bool is_float_text(double value);
 
+/// The column as float32 where none of its numbers, read from text, says more; else as it is.
+ScalarAttribute::Values narrowed(std::vector<double> column);
+
 /// A name as others may safely see it: valid UTF-8 without control characters or blanks ('_' in their place),
 /// at most 255 bytes, not empty.
 std::string clean_name(std::string_view name);
@@ -57,6 +65,26 @@ std::string lower_case(std::string_view text);
 struct TextLine {
   std::string_view text;
   std::uint64_t number = 0;  ///< from 1
+};
+
+/// The bytes as text, without a byte order mark.
+std::string_view text_of(std::span<const std::byte> bytes);
+
+/// Lines that end in "\n", "\r\n" or "\r".
+class LineReader {
+ public:
+  explicit LineReader(std::string_view text) : text_(text) {}
+
+  /// False: there is none left.
+  bool next(TextLine& line);
+  /// Where the next line starts.
+  [[nodiscard]] std::size_t offset() const { return at_; }
+
+ private:
+  std::string_view text_;
+  std::size_t at_ = 0;
+  std::size_t next_cr_ = 0;
+  std::uint64_t number_ = 0;
 };
 
 /// Takes the next word (runs of blanks, tabs and carriage returns part words) off the line; empty at its end.

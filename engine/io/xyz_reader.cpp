@@ -11,12 +11,6 @@ namespace {
 constexpr std::size_t kMostColumns = 256;
 constexpr double kUnitTolerance = 5e-3;  // of a normal's length, in text that may have three digits
 
-std::string_view text_of(std::span<const std::byte> bytes) {
-  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // a byte order mark
-  return text;
-}
-
 bool is_separator(char c) {
   return c == ' ' || c == '\t' || c == ',' || c == ';' || c == '\v' || c == '\f';
 }
@@ -44,29 +38,6 @@ void split_fields(std::string_view line, std::vector<std::string_view>& fields) 
     if (fields.size() > kMostColumns) return;
   }
 }
-
-// Lines that end in "\n", "\r\n" or "\r"; those without a field are passed over.
-class LineReader {
- public:
-  explicit LineReader(std::string_view text) : text_(text) {}
-
-  bool next(TextLine& line) {
-    if (at_ >= text_.size()) return false;
-    std::size_t end = std::min(text_.find('\n', at_), text_.size());
-    if (next_cr_ < at_ || next_cr_ == 0) next_cr_ = std::min(text_.find('\r', at_), text_.size());
-    end = std::min(end, next_cr_);
-    line = {text_.substr(at_, end - at_), ++number_};
-    const bool pair = end + 1 < text_.size() && text_[end] == '\r' && text_[end + 1] == '\n';
-    at_ = end + (pair ? 2 : 1);
-    return true;
-  }
-
- private:
-  std::string_view text_;
-  std::size_t at_ = 0;
-  std::size_t next_cr_ = 0;
-  std::uint64_t number_ = 0;
-};
 
 bool is_number(std::string_view field) {
   double ignored = 0.0;
@@ -264,9 +235,7 @@ class XyzReader {
 
   static ScalarAttribute::Values typed(std::vector<double> column, bool is_color) {
     if (is_color && is_byte_column(column)) return std::vector<std::uint8_t>(column.begin(), column.end());
-    if (std::all_of(column.begin(), column.end(), is_float_text))
-      return std::vector<float>(column.begin(), column.end());
-    return column;
+    return narrowed(std::move(column));
   }
 
   std::string_view text_;

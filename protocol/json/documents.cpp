@@ -52,6 +52,8 @@ std::string_view session_state_name(SessionState state) {
       return "ready";
     case SessionState::kFailed:
       return "failed";
+    case SessionState::kAsleep:
+      return "asleep";
   }
   throw LogicError("a session state that is none");
 }
@@ -60,7 +62,35 @@ JsonDocument to_json(const ModelBounds& bounds) {
   return JsonDocument{{"min", checked_vector(bounds.min)}, {"max", checked_vector(bounds.max)}};
 }
 
+namespace {
+
+std::string_view quality_name(NormalQuality quality) {
+  switch (quality) {
+    case NormalQuality::kNone:
+      return "none";
+    case NormalQuality::kUnit:
+      return "unit";
+    case NormalQuality::kScaled:
+      return "scaled";
+  }
+  throw LogicError("a quality of normals that is none");
+}
+
+/// A column of which no value is finite has no range.
+JsonDocument to_json(const AttributeRange& range, std::uint64_t samples) {
+  JsonDocument document{{"name", range.name}, {"type", range.type}};
+  const bool has_range = range.non_finite < samples;
+  document["min"] = has_range ? JsonDocument(checked_number(range.min)) : JsonDocument(nullptr);
+  document["max"] = has_range ? JsonDocument(checked_number(range.max)) : JsonDocument(nullptr);
+  document["non_finite"] = range.non_finite;
+  return document;
+}
+
+}  // namespace
+
 JsonDocument to_json(const ImportReport& report) {
+  JsonDocument scalars = JsonDocument::array();
+  for (const AttributeRange& range : report.ranges) scalars.push_back(to_json(range, report.sample_count));
   return JsonDocument{{"format", format_name(report.format)},
                       {"encoding", report.encoding},
                       {"declared_count", report.declared_count},
@@ -69,7 +99,13 @@ JsonDocument to_json(const ImportReport& report) {
                       {"from_mesh", report.from_mesh},
                       {"position_is_double", report.position_is_double},
                       {"attributes", string_array(report.attributes)},
-                      {"skipped", string_array(report.skipped)}};
+                      {"skipped", string_array(report.skipped)},
+                      {"normals", quality_name(report.normals)},
+                      {"scalars", std::move(scalars)},
+                      {"spacing", checked_number(report.spacing)},
+                      {"step", checked_vector(report.step)},
+                      {"verdict", report.warnings.empty() ? "ok" : "warnings"},
+                      {"warnings", string_array(report.warnings)}};
 }
 
 JsonDocument to_json(const CloudDocument& cloud) {
@@ -90,6 +126,16 @@ JsonDocument to_json(const ImageDocument& image) {
   return JsonDocument{{"id", image.id},         {"width", image.width},
                       {"height", image.height}, {"channels", string_array(image.channels)},
                       {"bytes", image.bytes},   {"created", to_rfc3339(image.created)}};
+}
+
+JsonDocument to_json(const UploadDocument& upload) {
+  return JsonDocument{{"id", upload.id},
+                      {"name", upload.name},
+                      {"media_type", upload.media_type},
+                      {"length", upload.length},
+                      {"offset", upload.offset},
+                      {"created", to_rfc3339(upload.created)},
+                      {"expires", to_rfc3339(upload.expires)}};
 }
 
 JsonDocument to_json(const DecompositionReport& report) {
@@ -141,7 +187,8 @@ JsonDocument to_json(const EditRecord& record) {
                       {"one_samples", record.one_samples},
                       {"inserted", record.inserted},
                       {"removed", record.removed},
-                      {"sample_count", record.sample_count}};
+                      {"sample_count", record.sample_count},
+                      {"surface_hash", record.surface_hash}};
 }
 
 JsonDocument to_json(const InfoDocument& info) {
@@ -150,11 +197,16 @@ JsonDocument to_json(const InfoDocument& info) {
   return JsonDocument{{"version", info.version},
                       {"limits", std::move(limits)},
                       {"formats", string_array(info.formats)},
-                      {"features", string_array(info.features)}};
+                      {"features", string_array(info.features)},
+                      {"caller", info.caller}};
 }
 
 JsonDocument cloud_list(const std::vector<CloudDocument>& clouds) {
   return JsonDocument{{"clouds", document_array(clouds)}};
+}
+
+JsonDocument upload_list(const std::vector<UploadDocument>& uploads) {
+  return JsonDocument{{"uploads", document_array(uploads)}};
 }
 
 JsonDocument image_list(const std::vector<ImageDocument>& images) {
@@ -186,6 +238,13 @@ JsonDocument progress_event(const Progress& progress) {
   JsonDocument event{{"event", "progress"}};
   event.update(progress_members(progress));
   return event;
+}
+
+JsonDocument presence_event(const std::vector<Viewer>& viewers) {
+  JsonDocument list = JsonDocument::array();
+  for (const Viewer& viewer : viewers)
+    list.push_back({{"name", viewer.name}, {"since", to_rfc3339(viewer.since)}});
+  return JsonDocument{{"event", "presence"}, {"viewers", std::move(list)}};
 }
 
 JsonDocument heartbeat_event() {

@@ -35,7 +35,18 @@ struct CloudDocument {
   ImportReport report;  ///< sample count and bounds are taken from it
 };
 
-enum class SessionState { kBuilding, kReady, kFailed };
+/// A resumable upload.
+struct UploadDocument {
+  std::string id;
+  std::string name;        ///< of the file, as the client calls it; may be empty
+  std::string media_type;  ///< as the client calls it; may be empty
+  std::uint64_t length = 0;
+  std::uint64_t offset = 0;
+  TimePoint created;
+  TimePoint expires;
+};
+
+enum class SessionState { kBuilding, kReady, kFailed, kAsleep };
 
 struct ImageDocument {
   std::string id;
@@ -88,6 +99,13 @@ struct EditRecord {
   std::uint64_t inserted = 0;      ///< samples, by resampling
   std::uint64_t removed = 0;       ///< samples, by garbage collection
   std::uint64_t sample_count = 0;  ///< after the edit
+  std::string surface_hash;        ///< after the edit, 64 hexadecimal digits
+};
+
+/// Someone who looks at a session.
+struct Viewer {
+  std::string name;  ///< as they gave it; may be empty
+  TimePoint since;
 };
 
 struct InfoDocument {
@@ -95,6 +113,7 @@ struct InfoDocument {
   std::vector<std::pair<std::string, std::uint64_t>> limits;  ///< every limit, by name
   std::vector<std::string> formats;
   std::vector<std::string> features;
+  JsonDocument caller = {};  ///< to_json(CallerDocument)
 };
 
 std::string_view session_state_name(SessionState state);
@@ -103,12 +122,14 @@ JsonDocument to_json(const ModelBounds& bounds);
 JsonDocument to_json(const ImportReport& report);
 JsonDocument to_json(const CloudDocument& cloud);
 JsonDocument to_json(const ImageDocument& image);
+JsonDocument to_json(const UploadDocument& upload);
 JsonDocument to_json(const DecompositionReport& report);
 JsonDocument to_json(const SessionSummary& session);
 JsonDocument to_json(const SessionDocument& session);
 JsonDocument to_json(const EditRecord& record);
 JsonDocument to_json(const InfoDocument& info);
 JsonDocument cloud_list(const std::vector<CloudDocument>& clouds);
+JsonDocument upload_list(const std::vector<UploadDocument>& uploads);
 JsonDocument image_list(const std::vector<ImageDocument>& images);
 JsonDocument session_list(const std::vector<SessionSummary>& sessions);
 /// {"region", "samples", "operations"}
@@ -120,6 +141,7 @@ JsonDocument edit_list(std::uint32_t head, const std::vector<EditRecord>& edits)
 /// Events of a stream (FRAMES.md).
 JsonDocument session_event(const SessionDocument& session);
 JsonDocument progress_event(const Progress& progress);
+JsonDocument presence_event(const std::vector<Viewer>& viewers);
 JsonDocument heartbeat_event();
 JsonDocument end_event(std::string_view reason);
 

@@ -32,6 +32,14 @@ constexpr std::array kProblems{
                 "A page of another origin asked for a change. Only the server's own pages, and programs that "
                 "send no Origin, may.",
                 false},
+    ProblemInfo{
+        kUnauthorized, 401, "unauthorized", "A token is needed",
+        "The request carries no token, or one that is unknown, expired or revoked: Authorization: Bearer "
+        "<token>.",
+        false},
+    ProblemInfo{kForbidden, 403, "forbidden", "The token does not permit this",
+                "The scope of the token (view, edit or admin) or of the share link does not reach so far.",
+                false},
     ProblemInfo{kNotFound, 404, "not-found", "Not found",
                 "There is nothing under this path: the id is unknown, or what it named was deleted.", false},
     ProblemInfo{kMethodNotAllowed, 405, "method-not-allowed", "Method not allowed",
@@ -43,13 +51,21 @@ constexpr std::array kProblems{
     ProblemInfo{kRequestTimeout, 408, "request-timeout", "The request came too slowly",
                 "The head or the body did not arrive within its deadline.", false},
     ProblemInfo{kWrongState, 409, "wrong-state", "Not possible in this state",
-                "The session is not ready: it is still building, or its building failed.", false},
+                "The session is not ready: it is still building, or its building failed. An upload is not "
+                "complete: bytes of it are still owed.",
+                false},
     ProblemInfo{kCloudInUse, 409, "cloud-in-use", "The cloud is in use",
                 "A session still uses the cloud; delete the session first.", false},
+    ProblemInfo{kUploadOffset, 409, "upload-offset", "The upload stands elsewhere",
+                "Upload-Offset is not the number of bytes that the server has; HEAD tells that number.",
+                false},
     ProblemInfo{kLengthRequired, 411, "length-required", "Content-Length is required",
                 "Bodies need a Content-Length; chunked bodies are not accepted.", false},
     ProblemInfo{kStaleRevision, 412, "stale-revision", "The session has moved on",
                 "If-Match names a revision that is no longer the current one; \"revision\" is.", false},
+    ProblemInfo{kTusVersion, 412, "tus-version", "Another tus version is asked for",
+                "Requests to uploads carry Tus-Resumable: 1.0.0; Tus-Version lists what this server speaks.",
+                false},
     ProblemInfo{kBodyTooLarge, 413, "body-too-large", "The body is too large",
                 "The body exceeds the limit of its route. /v1/info lists the limits.", false},
     ProblemInfo{kPathTooLong, 414, "path-too-long", "The path is too long", "The path exceeds its limit.",
@@ -60,6 +76,8 @@ constexpr std::array kProblems{
                 "More than one range was asked for.", false},
     ProblemInfo{kExpectationFailed, 417, "expectation-failed", "Expectation failed",
                 "The Expect header asks for something else than 100-continue.", false},
+    ProblemInfo{kUploadLocked, 423, "upload-locked", "The upload is in use",
+                "Another request writes to this upload, or it is being imported. Retry later.", true},
     ProblemInfo{kRevisionRequired, 428, "revision-required", "If-Match is required",
                 "Edits name the revision that they build on: If-Match: \"r<revision>\".", false},
     ProblemInfo{kTooMany, 429, "too-many", "A quota is used up",
@@ -67,6 +85,10 @@ constexpr std::array kProblems{
                 true},
     ProblemInfo{kHeadTooLarge, 431, "head-too-large", "The request head is too large",
                 "The request line and headers exceed their limits in bytes or number.", false},
+    ProblemInfo{
+        kChecksumMismatch, 460, "checksum-mismatch", "The checksum does not match",
+        "The bytes that came do not have the checksum that Upload-Checksum names; none of them is kept.",
+        false},
     ProblemInfo{kInternalError, 500, "internal-error", "Internal error",
                 "The server failed. The log holds the details under the request id.", false},
     ProblemInfo{kNotImplemented, 501, "not-implemented", "Not implemented",
@@ -76,9 +98,11 @@ constexpr std::array kProblems{
                 true},
     ProblemInfo{kHttpVersion, 505, "http-version-not-supported", "HTTP version not supported",
                 "This server speaks HTTP/1.1.", false},
-    ProblemInfo{kOutOfSpace, 507, "out-of-space", "No room left",
-                "The memory that the operator granted to clouds and sessions is used up; delete some first.",
-                true},
+    ProblemInfo{
+        kOutOfSpace, 507, "out-of-space", "No room left",
+        "The memory that the operator granted to clouds and sessions is used up, or the disk is full; "
+        "delete some first.",
+        true},
     ProblemInfo{kMalformedCloud, 422, "malformed-cloud", "The file is damaged",
                 "The bytes are not what they claim to be: truncated, inconsistent, or neither a point cloud "
                 "nor an image.",
@@ -99,6 +123,27 @@ constexpr std::array kProblems{
                 "An edit needs at least one sample in the zero-region and one in the one-region.", false},
     ProblemInfo{kRegionsIntersect, 422, "regions-intersect", "The regions intersect",
                 "The zero- and the one-region must not meet: a sample is in both, or two coincide.", false},
+    ProblemInfo{
+        kOutOfDisk, 507, "out-of-disk", "The disk is full",
+        "Nothing was changed, and nothing that was acknowledged is lost. Reading goes on; changes are "
+        "possible again once the operator has made room.",
+        true},
+    ProblemInfo{
+        kStorageFailed, 503, "storage-failed", "The disk has failed",
+        "The disk did not take what was written to it. Nothing more is acknowledged until the operator "
+        "has looked into it and started the server again; reading goes on.",
+        true},
+    ProblemInfo{kDamaged, 409, "damaged", "What is stored is damaged",
+                "What was read from the disk is not what was written, or does not lead to the surface that "
+                "was acknowledged. It was put aside and is not served; everything else is unharmed.",
+                false},
+    ProblemInfo{kKeyInUse, 409, "key-in-use", "The first request is still under way",
+                "A request with the same Idempotency-Key is being answered. Ask again for its answer.", true},
+    ProblemInfo{
+        kKeyReused, 422, "key-reused", "The key belongs to another request",
+        "The Idempotency-Key came with another method, path or body before. A new request needs a key "
+        "of its own.",
+        false},
     ProblemInfo{kCancelled, 409, "cancelled", "The work was cancelled",
                 "The session was deleted, or the server is stopping.", false},
 };

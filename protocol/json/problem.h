@@ -21,22 +21,28 @@ enum class ProblemKind {
   kInvalidValue,
   kHostNotAllowed,
   kOriginNotAllowed,
+  kUnauthorized,
+  kForbidden,
   kNotFound,
   kMethodNotAllowed,
   kNotAcceptable,
   kRequestTimeout,
   kWrongState,
   kCloudInUse,
+  kUploadOffset,
   kLengthRequired,
   kStaleRevision,
+  kTusVersion,
   kBodyTooLarge,
   kPathTooLong,
   kUnsupportedMediaType,
   kRangeNotSatisfiable,
   kExpectationFailed,
+  kUploadLocked,
   kRevisionRequired,
   kTooMany,
   kHeadTooLarge,
+  kChecksumMismatch,
   kInternalError,
   kNotImplemented,
   kOverloaded,
@@ -50,6 +56,11 @@ enum class ProblemKind {
   kEmptyCloud,
   kEmptyRegion,
   kRegionsIntersect,
+  kOutOfDisk,
+  kStorageFailed,
+  kDamaged,
+  kKeyInUse,
+  kKeyReused,
   kCancelled,
 };
 
@@ -80,7 +91,8 @@ struct Problem {
   std::vector<JsonFault> errors = {};
   std::optional<double> limit = std::nullopt;
   std::optional<double> actual = std::nullopt;
-  std::optional<std::uint64_t> revision = std::nullopt;  ///< kStaleRevision: the current one
+  std::optional<std::uint64_t> revision = std::nullopt;     ///< kStaleRevision: the current one
+  std::optional<std::uint32_t> retry_after = std::nullopt;  ///< seconds, where they are known
 
   [[nodiscard]] int status() const { return problem_info(kind).status; }
 };

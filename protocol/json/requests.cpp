@@ -181,17 +181,44 @@ Parsed<PreviewRequest> parse_preview(const Json& document) {
   return value_or_errors(std::move(request), std::move(errors));
 }
 
+namespace {
+
+/// The member /name.
+std::string read_name(const Json& value, JsonErrors& errors) {
+  std::string name = read_string(value, "/name", errors).value_or("");
+  if (value.is_string() && !is_valid_name(name))
+    errors.add("/name", "must be 1 to 120 bytes without control characters");
+  return name;
+}
+
+}  // namespace
+
+Parsed<ImportCloudRequest> parse_import_cloud(const Json& document) {
+  JsonErrors errors;
+  ImportCloudRequest request;
+  ObjectReader object(document, "", errors);
+  request.upload = required_id(object, "upload", "an upload");
+  if (const Json* const name = object.optional("name")) request.name = read_name(*name, errors);
+  if (const Json* const policy = object.optional("nonfinite")) {
+    constexpr std::array<std::string_view, 2> kPolicies{"reject", "drop"};
+    request.drop_non_finite = read_choice(*policy, "/nonfinite", errors, kPolicies).value_or(0) == 1;
+  }
+  if (const Json* const format = object.optional("format")) {
+    std::array<std::string_view, static_cast<std::size_t>(kLastCloudFormat) + 1> names;
+    for (std::size_t i = 0; i < names.size(); ++i) names.at(i) = format_name(static_cast<CloudFormat>(i));
+    if (const auto choice = read_choice(*format, "/format", errors, names))
+      request.format = static_cast<CloudFormat>(*choice);
+  }
+  object.finish();
+  return value_or_errors(std::move(request), std::move(errors));
+}
+
 Parsed<CreateSessionRequest> parse_create_session(const Json& document) {
   JsonErrors errors;
   CreateSessionRequest request;
   ObjectReader object(document, "", errors);
   request.cloud = required_id(object, "cloud", "a cloud");
-  if (const Json* const name = object.optional("name")) {
-    request.name = read_string(*name, "/name", errors).value_or("");
-    if (name->is_string() && !is_valid_name(request.name)) {
-      errors.add("/name", "must be 1 to 120 bytes without control characters");
-    }
-  }
+  if (const Json* const name = object.optional("name")) request.name = read_name(*name, errors);
   if (const Json* const scales = object.optional("scales")) {
     if (const Json* const array = read_array(*scales, "/scales", errors, 1, kMaxBands)) {
       request.params.scales.clear();
@@ -210,6 +237,15 @@ Parsed<CreateSessionRequest> parse_create_session(const Json& document) {
   object.finish();
   if (errors.empty()) add_verdict(validate(request.params), "", errors);
   return value_or_errors(std::move(request), std::move(errors));
+}
+
+Parsed<SessionChange> parse_session_change(const Json& document) {
+  JsonErrors errors;
+  SessionChange change;
+  ObjectReader object(document, "", errors);
+  if (const Json* const name = object.required("name")) change.name = read_name(*name, errors);
+  object.finish();
+  return value_or_errors(std::move(change), std::move(errors));
 }
 
 Parsed<HeadRequest> parse_head(const Json& document) {

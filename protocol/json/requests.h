@@ -2,6 +2,7 @@
 // What clients send: JSON documents to engine values, checked in full, and back.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "engine/editing/edit.h"
 #include "engine/editing/painting.h"
 #include "engine/editing/shape.h"
+#include "engine/io/cloud_io.h"
 #include "engine/multires/hierarchy.h"
 #include "protocol/json/parse.h"
 
@@ -25,6 +27,14 @@ struct CreateSessionRequest {
   HierarchyParams params;
 };
 
+/// POST /v1/clouds with a document
+struct ImportCloudRequest {
+  std::string upload;               ///< an id
+  std::optional<std::string> name;  ///< none: the file's
+  bool drop_non_finite = false;
+  std::optional<CloudFormat> format;  ///< none: found by looking
+};
+
 /// PUT and POST …/preview
 struct PreviewRequest {
   EditParams edit;
@@ -34,6 +44,11 @@ struct PreviewRequest {
 /// PUT …/head
 struct HeadRequest {
   std::uint32_t edit = 0;  ///< how many edits stay applied; 0: none
+};
+
+/// PATCH of a session
+struct SessionChange {
+  std::string name;
 };
 
 /// Operations that one painting may have.
@@ -46,7 +61,9 @@ Parsed<std::vector<PaintOperation>> parse_painting(const Json& document);  ///< 
 Parsed<EditParams> parse_edit(const Json& document);
 Parsed<PreviewRequest> parse_preview(const Json& document);
 Parsed<CreateSessionRequest> parse_create_session(const Json& document);
+Parsed<ImportCloudRequest> parse_import_cloud(const Json& document);
 Parsed<HeadRequest> parse_head(const Json& document);
+Parsed<SessionChange> parse_session_change(const Json& document);
 
 /// Text to value in one step: parse_body(body, limits, parse_edit).
 template <typename T>

@@ -2,15 +2,22 @@
 
 #include <sys/random.h>
 
-#include <array>
 #include <cerrno>
 #include <stdexcept>
 #include <string_view>
+#include <vector>
 
 namespace pointwright::server {
 
 std::string random_id() {
-  std::array<unsigned char, 16> bits{};
+  std::string id = random_text(16);
+  // Command lines would take it for an option.
+  while (id.front() == '-') id = random_text(16);
+  return id;
+}
+
+std::string random_text(std::size_t bytes) {
+  std::vector<unsigned char> bits(bytes);
   std::size_t have = 0;
   while (have < bits.size()) {
     const ssize_t count = ::getrandom(bits.data() + have, bits.size() - have, 0);
@@ -29,7 +36,7 @@ std::string random_id() {
       id.push_back(kAlphabet[accumulator >> static_cast<unsigned>(held) & 63U]);
     }
   }
-  id.push_back(kAlphabet[accumulator << static_cast<unsigned>(6 - held) & 63U]);
+  if (held > 0) id.push_back(kAlphabet[accumulator << static_cast<unsigned>(6 - held) & 63U]);
   return id;
 }
 

@@ -2,10 +2,12 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <optional>
 
 #include "protocol/json/documents.h"
 #include "server/cli/geometry_commands.h"
 #include "server/cli/local_file.h"
+#include "server/cli/remote/commands.h"
 #include "server/ingest/files.h"
 
 namespace pointwright::server {
@@ -36,11 +38,13 @@ Result<ImportedCloud> read_input(const Options& options) {
 }
 
 /// Writes the cloud into options.output, in the format that its name asks for.
-int write_output(const Cloud& cloud, const Options& options, std::ostream& err) {
+int write_output(const Cloud& cloud, const std::optional<PositionGrid>& grid, const Options& options,
+                 std::ostream& err) {
   const auto format = format_of_name(options.output);
   if (!format) return fail(err, options.output, format.error());
   const auto bytes =
-      write_cloud(cloud, format.value(), {.ascii = options.ascii, .draco_position_bits = options.draco_bits});
+      write_cloud(cloud, format.value(),
+                  {.ascii = options.ascii, .draco_position_bits = options.draco_bits, .grid = grid});
   if (!bytes) return fail(err, options.output, bytes.error());
   if (const auto written = write_file_atomically(options.output, bytes.value()); !written)
     return fail(err, options.output, written.error());
@@ -73,6 +77,7 @@ int rewrite(const Options& options, std::ostream& out, std::ostream& err, Change
   auto imported = read_input(options);
   if (!imported) return fail(err, options.input, imported.error());
   std::string report;
+  const auto grid = imported.value().report.grid;
   const auto changed = change(std::move(imported).value().cloud, report);
   if (!changed) {
     const Error& error = changed.error();
@@ -82,7 +87,7 @@ int rewrite(const Options& options, std::ostream& out, std::ostream& err, Change
         << "\n";
     return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
   }
-  if (const int failed = write_output(changed.value(), options, err); failed != 0) return failed;
+  if (const int failed = write_output(changed.value(), grid, options, err); failed != 0) return failed;
   if (!report.empty()) out << report << "\n";
   return 0;
 }
@@ -112,14 +117,12 @@ int info(const Options& options, std::ostream& out, std::ostream& err) {
       << "minimum     " << bounds.min.transpose() << "\n"
       << "maximum     " << bounds.max.transpose() << "\n"
       << "positions   " << (report.position_is_double ? "float64" : "float32") << "\n"
+      << "step        " << report.step.transpose() << "\n"
+      << "spacing     " << report.spacing << "\n"
       << "attributes ";
   for (const std::string& attribute : report.attributes) out << " " << attribute;
   out << "\n";
-  if (!report.skipped.empty()) {
-    out << "skipped    ";
-    for (const std::string& name : report.skipped) out << " " << name;
-    out << "\n";
-  }
+  for (const std::string& warning : report.warnings) out << "warning     " << warning << "\n";
   return 0;
 }
 
@@ -153,6 +156,30 @@ CLI::App* add_simplify(CLI::App& app, SimplifyOptions& options) {
   return command;
 }
 
+/// Answers the command that prints a completion.
+CLI::App* add_remote_commands(CLI::App& app, RemoteCommands& remote, std::string& shell) {
+  remote.add(app, "server", "what a server can do, and its limits", [](const Context& context) {
+    context.show(context.service.ask(HttpRequest{.path = "/v1/info"}), [&](const nlohmann::json& document) {
+      context.out << "version     " << document.at("version").get<std::string>() << "\nfeatures   ";
+      for (const auto& feature : document.at("features")) context.out << " " << feature.get<std::string>();
+      context.out << "\n";
+      for (const auto& [name, value] : document.at("limits").items())
+        context.out << name << " " << value << "\n";
+    });
+  });
+  add_cloud_commands(app, remote);
+  add_session_commands(app, remote);
+  add_paint_command(app, remote);
+  add_edit_commands(app, remote);
+  add_history_commands(app, remote);
+  add_recipe_commands(app, remote);
+  add_job_commands(app, remote);
+  CLI::App* const completion =
+      app.add_subcommand("completion", "a script that completes commands in a shell");
+  completion->add_option("SHELL", shell, "bash")->required()->check(CLI::IsMember({"bash"}));
+  return completion;
+}
+
 }  // namespace
 
 int run_command(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
@@ -165,18 +192,23 @@ int run_command(const std::vector<std::string>& arguments, std::ostream& out, st
   CLI::App* const smooth_command = add_smooth(app, options.smooth);
   CLI::App* const simplify_command = add_simplify(app, options.simplify);
   for (CLI::App* const command : {convert_command, smooth_command, simplify_command}) {
-    command->add_option("IN", options.input, "Draco, PLY or XYZ file, gzip-compressed or not")->required();
-    command->add_option("OUT", options.output, ".drc, .ply, .xyz, .txt or .asc")->required();
+    command->add_option("IN", options.input, "Draco, PLY, LAS, PCD, OBJ or XYZ file, gzip-compressed or not")
+        ->required();
+    command->add_option("OUT", options.output, ".drc, .ply, .las, .xyz, .txt or .asc")->required();
     command
         ->add_option("--draco-bits", options.draco_bits,
                      "quantise positions to so many bits; lossless without")
         ->check(CLI::Range(8, 30));
     command->add_flag("--ascii", options.ascii, "PLY as text");
   }
+  RemoteCommands remote;
   CLI::App* const info_command = app.add_subcommand("info", "tell what a file holds");
-  info_command->add_option("FILE", options.input, "Draco, PLY or XYZ file, gzip-compressed or not")
+  info_command
+      ->add_option("FILE", options.input, "Draco, PLY, LAS, PCD, OBJ or XYZ file, gzip-compressed or not")
       ->required();
   info_command->add_flag("--json", options.json, "as a JSON document");
+  std::string shell;
+  CLI::App* const completion_command = add_remote_commands(app, remote, shell);
   for (CLI::App* const command : {convert_command, info_command, smooth_command, simplify_command}) {
     command->add_flag("--drop-non-finite", options.drop_non_finite, "leave out samples that are not finite");
     command->add_option("--max-mebibytes", options.max_mebibytes, "largest file to read, inflated")
@@ -187,9 +219,15 @@ int run_command(const std::vector<std::string>& arguments, std::ostream& out, st
     std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
     app.parse(std::move(reversed));
   } catch (const CLI::ParseError& error) {
-    return app.exit(error, out, err) == 0 ? 0 : 2;
+    if (app.exit(error, out, err) == 0) return 0;
+    return is_remote_command(arguments) ? static_cast<int>(ExitCode::kUsage) : 2;
   }
   try {
+    if (completion_command->parsed()) {
+      out << bash_completion(app);
+      return 0;
+    }
+    if (const auto status = remote.run(out, err)) return *status;
     if (convert_command->parsed()) return convert(options, out, err);
     if (smooth_command->parsed())
       return rewrite(options, out, err, [&](const Cloud& cloud, std::string& report) {

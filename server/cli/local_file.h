@@ -18,7 +18,7 @@ Result<std::vector<std::byte>> inflate_gzip(std::span<const std::byte> compresse
 Result<ImportedCloud> read_local_cloud(const std::string& path, const ImportParams& params,
                                        std::uint64_t max_bytes);
 
-/// The format that a file's name asks for: .drc, .ply, .xyz, .txt, .asc. Error: kUnsupportedFormat.
+/// The format that a file's name asks for: .drc, .ply, .las, .xyz, .txt, .asc. Error: kUnsupportedFormat.
 Result<CloudFormat> format_of_name(const std::string& path);
 
 }  // namespace pointwright::server

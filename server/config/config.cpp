@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
+#include <filesystem>
 #include <stdexcept>
 
 #include "server/config/setting.h"
@@ -64,17 +65,23 @@ std::vector<Assignment> environment_assignments(const std::vector<Setting>& sett
 }
 
 void check_whole(const Config& config) {
-  if (!is_loopback(config.host) && !config.allow_remote)
-    throw std::invalid_argument(
-        "host " + config.host +
-        " is not a loopback address; --allow-remote permits it (behind a reverse proxy that "
-        "does TLS and access control)");
+  if (is_loopback(config.host)) return;
+  const std::string host = std::string("host ").append(config.host).append(" is not a loopback address; ");
+  if (token_file(config).empty())
+    throw std::invalid_argument(host +
+                                "beyond loopback callers need tokens: --tokens FILE (see pointwrightd "
+                                "token add)");
+  if (!config.behind_proxy && !config.allow_remote)
+    throw std::invalid_argument(host +
+                                "beyond loopback tokens need TLS: --behind-proxy says that a reverse "
+                                "proxy does it");
 }
 
-void apply_assignments(const std::vector<Assignment>& assignments, Config& config) {
+void apply_assignments(const std::vector<Assignment>& assignments, Config& config, SettingSources& sources) {
   for (const Assignment& assignment : assignments) {
     try {
       assignment.setting->set(config, assignment.values);
+      sources[std::string(assignment.setting->key)] = assignment.source;
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument(assignment.source + ": " + error.what());
     }
@@ -116,20 +123,27 @@ ConfigOutcome read_config(const std::vector<std::string>& arguments, const Envir
   }
   try {
     Config config;
+    SettingSources sources;
     if (config_path.empty()) config_path = environment("POINTWRIGHT_CONFIG").value_or("");
-    if (!config_path.empty()) apply_file(config_path, settings, config);
-    apply_assignments(environment_assignments(settings, environment, names, config.unknown_variables),
-                      config);
+    if (!config_path.empty()) apply_file(config_path, settings, config, sources);
+    apply_assignments(environment_assignments(settings, environment, names, config.unknown_variables), config,
+                      sources);
     std::vector<Assignment> from_arguments;
     for (std::size_t i = 0; i < settings.size(); ++i)
       if (!given[i].empty()) from_arguments.push_back({&settings[i], given[i], option_name(settings[i].key)});
-    apply_assignments(from_arguments, config);
+    apply_assignments(from_arguments, config, sources);
     check_whole(config);
-    if (print_config) return ConfigExit{0, to_toml(config)};
+    if (print_config) return ConfigExit{0, to_toml(config, sources)};
     return config;
   } catch (const std::invalid_argument& error) {
     return ConfigExit{2, std::string("pointwrightd: ") + error.what() + "\n"};
   }
+}
+
+std::string token_file(const Config& config) {
+  if (!config.tokens.empty() || config.data.empty()) return config.tokens;
+  std::string beside = config.data + "/tokens.json";
+  return std::filesystem::exists(beside) ? beside : std::string();
 }
 
 bool is_loopback(const std::string& host) {

@@ -23,8 +23,12 @@ struct Config {
   std::string host = "127.0.0.1";
   std::uint16_t port = 7878;  ///< 0: any free one
   std::string port_file;      ///< the bound port is written here once the daemon listens; empty: nowhere
-  bool allow_remote = false;  ///< binding beyond loopback: behind a reverse proxy only
+  bool behind_proxy = false;  ///< a reverse proxy does TLS: permits an address beyond loopback, with tokens
+  bool allow_remote = false;  ///< the older name of behind_proxy
   std::vector<std::string> allowed_hosts;  ///< host names answered for, besides loopback's
+  std::vector<std::string> cors_origins;   ///< whose pages may use the API
+  std::string data;                        ///< the folder for what outlives the daemon; empty: nothing does
+  std::string tokens;                      ///< the file of tokens; empty: <data>/tokens.json where that is
   std::string web_root;                    ///< the viewer's files; empty: none are served
   std::vector<SampleFile> samples;
   std::string log_level = "info";  ///< trace, debug, info, warn, error or off
@@ -57,6 +61,9 @@ ConfigOutcome read_config(const std::vector<std::string>& arguments, const Envir
 
 /// The settings as TOML.
 std::string to_toml(const Config& config);
+
+/// The file of tokens that is in use; empty where none is.
+std::string token_file(const Config& config);
 
 /// A loopback address: what may be bound without allow_remote.
 bool is_loopback(const std::string& host);

@@ -38,19 +38,20 @@ void apply_entry(std::string_view key, const toml::node& node, bool below_limits
 }
 
 void apply_table(const toml::table& table, bool below_limits, const std::string& path,
-                 const std::vector<Setting>& settings, Config& config) {
+                 const std::vector<Setting>& settings, Config& config, SettingSources& sources) {
   for (const auto& [key, node] : table) {
     if (!below_limits && key.str() == "limits") {
       if (const toml::table* limits = node.as_table()) {
-        apply_table(*limits, true, path, settings, config);
+        apply_table(*limits, true, path, settings, config, sources);
         continue;
       }
     }
+    const std::string place = path + ":" + std::to_string(node.source().begin.line);
     try {
       apply_entry(key.str(), node, below_limits, settings, config);
+      sources[std::string(key.str())] = place;
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(path + ":" + std::to_string(node.source().begin.line) + ": " +
-                                  std::string(key.str()) + ": " + error.what());
+      throw std::invalid_argument(place + ": " + std::string(key.str()) + ": " + error.what());
     }
   }
 }
@@ -78,7 +79,8 @@ std::string value_text(const Setting& setting, const Config& config) {
 
 }  // namespace
 
-void apply_file(const std::string& path, const std::vector<Setting>& settings, Config& config) {
+void apply_file(const std::string& path, const std::vector<Setting>& settings, Config& config,
+                SettingSources& sources) {
   toml::table table;
   try {
     table = toml::parse_file(path);
@@ -86,15 +88,21 @@ void apply_file(const std::string& path, const std::vector<Setting>& settings, C
     throw std::invalid_argument(path + ":" + std::to_string(error.source().begin.line) + ": " +
                                 std::string(error.description()));
   }
-  apply_table(table, false, path, settings, config);
+  apply_table(table, false, path, settings, config, sources);
 }
 
 std::string to_toml(const Config& config) {
+  return to_toml(config, {});
+}
+
+std::string to_toml(const Config& config, const SettingSources& sources) {
   std::string text;
   std::string limits = "\n[limits]\n";
   for (const Setting& setting : all_settings()) {
     std::string line = std::string(setting.key) + " = " + value_text(setting, config);
-    line += "  # " + std::string(setting.meaning) + "\n";
+    const auto source = sources.find(setting.key);
+    line += "  # " + std::string(setting.meaning);
+    line += " (" + (source == sources.end() ? "default" : source->second) + ")\n";
     (is_limit(setting.key) ? limits : text) += line;
   }
   return text + limits;

@@ -9,6 +9,11 @@ constexpr std::uint64_t kTebi = 1ULL << 40U;
 
 constexpr std::array kTable = {
     LimitInfo{"max_upload_bytes", &Limits::max_upload_bytes, 1, kTebi, "bytes of one uploaded file"},
+    LimitInfo{"max_uploads", &Limits::max_uploads, 1, 100'000, "resumable uploads held at once"},
+    LimitInfo{"max_upload_file_bytes", &Limits::max_upload_file_bytes, 1, kTebi,
+              "bytes of one resumable upload, on disk"},
+    LimitInfo{"upload_expiry_s", &Limits::upload_expiry_s, 1, 365ULL * 86'400ULL,
+              "time after the last byte until a resumable upload that was not imported is removed"},
     LimitInfo{"max_samples", &Limits::max_samples, 1, 2'000'000'000, "samples of one cloud"},
     LimitInfo{"max_clouds", &Limits::max_clouds, 1, 1'000'000, "clouds held at once"},
     LimitInfo{"max_cloud_bytes", &Limits::max_cloud_bytes, 1, kTebi, "memory of all clouds together"},
@@ -33,6 +38,12 @@ constexpr std::array kTable = {
     LimitInfo{"max_operations", &Limits::max_operations, 1, 10'000, "painting operations of one region"},
     LimitInfo{"max_painting_vertices", &Limits::max_painting_vertices, 1, 1'000'000'000,
               "vertices of strokes and outlines and balls of one region's operations"},
+    LimitInfo{"max_kept_answers", &Limits::max_kept_answers, 1, 100'000'000,
+              "answers to requests with an Idempotency-Key that are remembered, each for a day"},
+    LimitInfo{"session_idle_expiry_s", &Limits::session_idle_expiry_s, 0, 1'000'000'000,
+              "time after which a session that nobody asks for is deleted, seconds; 0: never"},
+    LimitInfo{"wake_wait_ms", &Limits::wake_wait_ms, 0, 600'000,
+              "time that a request waits for a session that is being brought back"},
     LimitInfo{"max_json_bytes", &Limits::max_json_bytes, 256, 64ULL << 20U, "bytes of a JSON body"},
     LimitInfo{"max_recipe_bytes", &Limits::max_recipe_bytes, 256, 1ULL << 30U,
               "bytes of a recipe, or of a painting that is put back whole"},
@@ -61,6 +72,17 @@ constexpr std::array kTable = {
     LimitInfo{"heartbeat_ms", &Limits::heartbeat_ms, 50, 60'000, "time between the heartbeats of a stream"},
     LimitInfo{"shutdown_deadline_ms", &Limits::shutdown_deadline_ms, 100, 600'000,
               "time for running requests to end when the daemon stops"},
+    LimitInfo{"token_sessions", &Limits::token_sessions, 0, 100'000,
+              "sessions of one token, where it has no quota of its own"},
+    LimitInfo{"token_samples", &Limits::token_samples, 0, kTebi,
+              "samples of one token's sessions together, as they begin"},
+    LimitInfo{"token_stored_bytes", &Limits::token_stored_bytes, 0, kTebi,
+              "bytes of the uploads of one token that are kept"},
+    LimitInfo{"token_upload_bytes_per_day", &Limits::token_upload_bytes_per_day, 0, kTebi,
+              "bytes that one token may upload in a day"},
+    LimitInfo{"token_streams", &Limits::token_streams, 0, 10'000, "streams of one token open at once"},
+    LimitInfo{"token_requests_per_second", &Limits::token_requests_per_second, 1, 1'000'000,
+              "requests of one token in a second, in the long run"},
 };
 
 }  // namespace

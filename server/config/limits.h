@@ -10,6 +10,9 @@ namespace pointwright::server {
 
 struct Limits {
   std::uint64_t max_upload_bytes = 1ULL << 30U;
+  std::uint64_t max_uploads = 64;
+  std::uint64_t max_upload_file_bytes = 16ULL << 30U;
+  std::uint64_t upload_expiry_s = 86'400;
   std::uint64_t max_samples = 20'000'000;
   std::uint64_t max_clouds = 64;
   std::uint64_t max_cloud_bytes = 4ULL << 30U;
@@ -25,11 +28,14 @@ struct Limits {
   std::uint64_t max_edits = 10'000;
   std::uint64_t max_operations = 10'000;
   std::uint64_t max_painting_vertices = 1'000'000;
+  std::uint64_t max_kept_answers = 100'000;
+  std::uint64_t session_idle_expiry_s = 0;
+  std::uint64_t wake_wait_ms = 5'000;
   std::uint64_t max_json_bytes = 8ULL << 20U;
   std::uint64_t max_recipe_bytes = 32ULL << 20U;
   std::uint64_t max_json_depth = 32;
   std::uint64_t max_connections = 1024;
-  std::uint64_t max_streams = 64;
+  std::uint64_t max_streams = 256;
   std::uint64_t max_decoders = 2;
   std::uint64_t max_upload_memory = 2ULL << 30U;
   std::uint64_t max_json_memory = 128ULL << 20U;
@@ -43,6 +49,12 @@ struct Limits {
   std::uint64_t stream_write_deadline_ms = 20'000;
   std::uint64_t heartbeat_ms = 5'000;
   std::uint64_t shutdown_deadline_ms = 8'000;
+  std::uint64_t token_sessions = 16;
+  std::uint64_t token_samples = 40'000'000;
+  std::uint64_t token_stored_bytes = 8ULL << 30U;
+  std::uint64_t token_upload_bytes_per_day = 32ULL << 30U;
+  std::uint64_t token_streams = 64;
+  std::uint64_t token_requests_per_second = 200;
   friend bool operator==(const Limits&, const Limits&) = default;
 };
 

@@ -65,6 +65,15 @@ Setting text_setting(std::string_view key, std::string Config::*member, std::str
           .get = [member](const Config& c) { return std::vector<std::string>{c.*member}; }};
 }
 
+Setting flag_setting(std::string_view key, bool Config::*member, std::string_view meaning) {
+  return {
+      .key = key,
+      .meaning = meaning,
+      .is_flag = true,
+      .set = [member](Config& c, const std::vector<std::string>& v) { c.*member = parse_flag(single(v)); },
+      .get = [member](const Config& c) { return std::vector<std::string>{c.*member ? "true" : "false"}; }};
+}
+
 Setting limit_setting(const LimitInfo& info) {
   return {.key = info.name,
           .meaning = info.meaning,
@@ -119,6 +128,42 @@ Setting allowed_hosts_setting() {
           .get = [](const Config& c) { return c.allowed_hosts; }};
 }
 
+/// "https://app.example" or "http://localhost:5173": scheme, host and a port that is not the scheme's own.
+std::string parse_origin(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::size_t scheme_end = text.find("://");
+  const std::string scheme = text.substr(0, scheme_end);
+  if (scheme_end == std::string::npos || (scheme != "http" && scheme != "https"))
+    throw std::invalid_argument("\"" + text + "\" is not an origin such as https://app.example");
+  std::string host = text.substr(scheme_end + 3);
+  const std::size_t close = host.find(']');
+  const std::size_t colon = host.find(':', close == std::string::npos ? 0 : close);
+  std::string port;
+  if (colon != std::string::npos) {
+    port = std::to_string(parse_number(host.substr(colon + 1), 1, 65535));
+    host.resize(colon);
+  }
+  std::string origin = scheme + "://" + parse_host_name(host);
+  const bool is_usual = port == (scheme == "https" ? "443" : "80");
+  if (!port.empty() && !is_usual) origin += ":" + port;
+  return origin;
+}
+
+Setting cors_origins_setting() {
+  return {.key = "cors_origins",
+          .meaning =
+              "origin whose pages may use the API, such as https://app.example; may be given more than "
+              "once",
+          .is_list = true,
+          .set =
+              [](Config& c, const std::vector<std::string>& v) {
+                c.cors_origins.clear();
+                for (const std::string& text : v) c.cors_origins.push_back(parse_origin(text));
+              },
+          .get = [](const Config& c) { return c.cors_origins; }};
+}
+
 }  // namespace
 
 std::vector<Setting> all_settings() {
@@ -133,13 +178,18 @@ std::vector<Setting> all_settings() {
            },
        .get = [](const Config& c) { return std::vector<std::string>{std::to_string(c.port)}; }},
       text_setting("port_file", &Config::port_file, "file that gets the bound port once the daemon listens"),
-      {.key = "allow_remote",
-       .meaning =
-           "permit an address beyond loopback (behind a reverse proxy that does TLS and access control)",
-       .is_flag = true,
-       .set = [](Config& c, const std::vector<std::string>& v) { c.allow_remote = parse_flag(single(v)); },
-       .get = [](const Config& c) { return std::vector<std::string>{c.allow_remote ? "true" : "false"}; }},
+      flag_setting("behind_proxy", &Config::behind_proxy,
+                   "a reverse proxy does TLS; permits an address beyond loopback, where tokens are in use"),
+      flag_setting("allow_remote", &Config::allow_remote, "the older name of behind_proxy"),
       allowed_hosts_setting(),
+      cors_origins_setting(),
+      text_setting("data", &Config::data,
+                   "folder that keeps clouds, images and sessions; where none is given they end with the "
+                   "daemon"),
+      text_setting(
+          "tokens", &Config::tokens,
+          "file of tokens (mode 0600); where it is not given, tokens.json of the data folder if it is "
+          "there"),
       text_setting("web", &Config::web_root,
                    "folder with the viewer's files; none are served where it is not given"),
       samples_setting(),

@@ -1,6 +1,11 @@
 #include "server/handlers/cloud_file.h"
 
-#include "engine/io/cloud_io.h"
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "engine/io/columns.h"
+#include "server/base/sha256.h"
 
 namespace pointwright::server {
 namespace {
@@ -22,14 +27,25 @@ Problem no_room(const Service& service) {
 
 CloudFormat kind_of(const Format& format) {
   if (format.name == "draco") return CloudFormat::kDraco;
+  if (format.name == "las") return CloudFormat::kLas;
   return format.name == "xyz" ? CloudFormat::kXyz : CloudFormat::kPly;
 }
 
 Outcome<SharedFile> write_file(Service& service, const std::function<std::shared_ptr<const Cloud>()>& make,
-                               std::uint64_t cloud_bytes, const Format& format) {
+                               std::uint64_t cloud_bytes, const CloudFile& file) {
   auto memory = service.answer_memory.hold_or_alone(kCopyAndFile * cloud_bytes);
   if (memory == nullptr) return no_room(service);
-  auto written = write_cloud(*make(), kind_of(format), {});
+  auto cloud = make();
+  if (file.options.attributes) {
+    auto chosen = with_attributes(*cloud, *file.options.attributes);
+    if (!chosen) {
+      Problem problem = protocol::to_problem(chosen.error());
+      problem.errors = {{.pointer = "?attributes", .detail = chosen.error().message}};
+      return problem;
+    }
+    cloud = std::make_shared<const Cloud>(std::move(chosen).value());
+  }
+  auto written = write_cloud(*cloud, kind_of(file.format), {.ascii = file.options.ascii, .grid = file.grid});
   if (!written) {
     Problem problem = protocol::to_problem(written.error());
     // The request is fine; it is the answer that cannot be given in this format.
@@ -46,16 +62,44 @@ Outcome<SharedFile> write_file(Service& service, const std::function<std::shared
 const std::vector<Format>& cloud_file_formats() {
   static const std::vector<Format> formats = {{"ply", "application/x-ply", ".ply"},
                                               {"draco", "model/x-draco", ".drc"},
-                                              {"xyz", "text/plain; charset=utf-8", ".xyz"}};
+                                              {"xyz", "text/plain; charset=utf-8", ".xyz"},
+                                              {"las", "application/vnd.las", ".las"}};
   return formats;
+}
+
+bool FileOptions::names(std::string_view attribute) const {
+  return attributes && std::find(attributes->begin(), attributes->end(), attribute) != attributes->end();
+}
+
+std::string FileOptions::tag() const {
+  std::string text = ascii ? "ascii" : "";
+  if (!attributes) return text;
+  // Names may hold anything: their digest stands in the tag.
+  std::string all;
+  for (const std::string& name : *attributes) all.append(name).append(1, ',');
+  constexpr std::size_t kEnough = 16;
+  return text.append(sha256_hex(std::as_bytes(std::span(all.data(), all.size()))).substr(0, kEnough));
+}
+
+Outcome<FileOptions> query_file_options(const RequestHead& head, const Format& format) {
+  constexpr std::array<std::string_view, 2> kEncodings{"binary", "ascii"};
+  FileOptions options;
+  const auto encoding = query_choice(head, "encoding", kEncodings);
+  if (!encoding.ok()) return encoding.problem();
+  options.ascii = encoding.value() == std::optional<std::size_t>(1);
+  if (encoding.value() && format.name != "ply")
+    return Problem{.kind = ProblemKind::kInvalidValue,
+                   .detail = "only PLY files have a choice of encodings",
+                   .errors = {{.pointer = "?encoding", .detail = "for format=ply only"}}};
+  if (query_value(head, "attributes")) options.attributes = query_list(head, "attributes");
+  return options;
 }
 
 Response cloud_file_response(Service& service, const Request& request,
                              const std::function<std::shared_ptr<const Cloud>()>& make,
                              std::uint64_t cloud_bytes, const CloudFile& file) {
   const auto begin = std::chrono::steady_clock::now();
-  const auto ran =
-      computed(service.background, [&] { return write_file(service, make, cloud_bytes, file.format); });
+  const auto ran = computed(service.background, [&] { return write_file(service, make, cloud_bytes, file); });
   if (!ran.ok()) return problem_response(ran.problem(), request);
   if (!ran.value().ok()) return problem_response(ran.value().problem(), request);
   const SharedFile& written = ran.value().value();

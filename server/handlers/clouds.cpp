@@ -10,8 +10,8 @@ Response not_found(const Request& request) {
   return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such cloud"}, request);
 }
 
-std::string content_tag(const StoredCloud& cloud) {
-  return etag_of({cloud.document.sha256});
+std::string content_tag(const protocol::CloudDocument& cloud) {
+  return etag_of({cloud.sha256});
 }
 
 Outcome<ImportRequest> import_request(const RequestHead& head) {
@@ -32,46 +32,108 @@ Outcome<ImportRequest> import_request(const RequestHead& head) {
   return import;
 }
 
+/// The upload that a document names, taken for the import; it is removed where that succeeds.
+Outcome<SharedCloud> import_upload(Service& service, const Request& request,
+                                   const Seal<protocol::CloudDocument>& seal) {
+  if (auto known = check_query(request.head, {}); !known.ok()) return known.problem();
+  const auto asked = parsed_body(service, request, protocol::parse_import_cloud);
+  if (!asked.ok()) return asked.problem();
+  const auto upload = service.uploads.find(asked.value().upload);
+  // Nothing of what belongs to another is told or held, not for a moment.
+  const bool is_there = upload && request.caller.may_see(upload->record.owner);
+  auto lease = service.uploads.lease(is_there ? asked.value().upload : std::string());
+  if (!lease.ok()) {
+    Problem problem = lease.problem();
+    if (problem.kind == ProblemKind::kNotFound) {
+      problem.kind = ProblemKind::kInvalidValue;
+      problem.errors = {{.pointer = "/upload", .detail = "there is no such upload"}};
+    }
+    return problem;
+  }
+  const UploadRecord record = lease.value()->record();
+  auto quota = service.access.hold(request.caller, Quota::kStoredBytes, record.length);
+  if (!quota.ok()) return quota.problem();
+  const ImportRequest import{
+      .name = asked.value().name.value_or(protocol::is_valid_name(record.name) ? record.name : "cloud"),
+      .drop_non_finite = asked.value().drop_non_finite,
+      .format = asked.value().format,
+      .owner = request.caller.token,
+      .quota = std::move(quota.value())};
+  if (auto room = service.clouds.check_room(); !room.ok()) return room.problem();
+  auto cloud = import_cloud(service.clouds, service.decode_file, service.decode, service.background,
+                            service.config.limits, {lease.value()->file(), record.length}, import, seal);
+  lease.value().reset();
+  // The cloud has all of it; where another request was quicker, it is gone already.
+  if (cloud.ok()) static_cast<void>(service.uploads.remove(record.id).ok());
+  return cloud;
+}
+
+Outcome<SharedCloud> import_body(Service& service, const Request& request,
+                                 const Seal<protocol::CloudDocument>& seal) {
+  auto import = import_request(request.head);
+  if (!import.ok()) return import.problem();
+  auto quota = service.access.hold(request.caller, Quota::kStoredBytes, request.body.size());
+  if (!quota.ok()) return quota.problem();
+  import.value().owner = request.caller.token;
+  import.value().quota = std::move(quota.value());
+  return import_cloud(service.clouds, service.decode, service.background, service.config.limits,
+                      request.body_bytes(), import.value(), seal);
+}
+
 }  // namespace
 
-Response list_clouds(Service& service, const Request&) {
+Response list_clouds(Service& service, const Request& request) {
   std::vector<protocol::CloudDocument> documents;
-  for (const SharedCloud& cloud : service.clouds.list()) documents.push_back(cloud->document);
+  for (const SharedCloud& cloud : service.clouds.list())
+    if (request.caller.may_see(cloud->owner)) documents.push_back(cloud->document);
   return json_response(protocol::cloud_list(documents));
 }
 
 Response upload_cloud(Service& service, const Request& request) {
-  const auto import = import_request(request.head);
-  if (!import.ok()) return problem_response(import.problem(), request);
   const auto begin = std::chrono::steady_clock::now();
-  const auto cloud = import_cloud(service.clouds, service.decode, service.background, service.config.limits,
-                                  request.body_bytes(), import.value());
+  const auto answer = [](const protocol::CloudDocument& document) {
+    return json_response(protocol::to_json(document), 201)
+        .with_header("Location", "/v1/clouds/" + document.id)
+        .with_header("ETag", content_tag(document));
+  };
+  const auto seal = sealed<protocol::CloudDocument>(request, answer);
+  const bool names_upload = request.head.media_type() == "application/json";
+  const auto cloud =
+      names_upload ? import_upload(service, request, seal) : import_body(service, request, seal);
   if (!cloud.ok()) return problem_response(cloud.problem(), request);
-  Response response = json_response(protocol::to_json(cloud.value()->document), 201);
+  Response response = answer_of(request, cloud.value()->document, answer);
   response.timings.emplace_back(
       "decode", std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-  return response.with_header("Location", "/v1/clouds/" + cloud.value()->document.id)
-      .with_header("ETag", content_tag(*cloud.value()));
+  return response;
 }
 
 Response get_cloud(Service& service, const Request& request) {
   const SharedCloud cloud = service.clouds.find(request.captures.at(0));
   if (cloud == nullptr) return not_found(request);
-  if (is_unchanged(request.head, content_tag(*cloud))) return not_modified(content_tag(*cloud));
-  return json_response(protocol::to_json(cloud->document)).with_header("ETag", content_tag(*cloud));
+  const std::string etag = content_tag(cloud->document);
+  if (is_unchanged(request.head, etag)) return not_modified(etag);
+  return json_response(protocol::to_json(cloud->document)).with_header("ETag", etag);
 }
 
 Response get_cloud_data(Service& service, const Request& request) {
   const SharedCloud cloud = service.clouds.find(request.captures.at(0));
   if (cloud == nullptr) return not_found(request);
-  if (auto known = check_query(request.head, {"format"}); !known.ok())
+  if (auto known = check_query(request.head, {"format", "attributes", "encoding"}); !known.ok())
     return problem_response(known.problem(), request);
   const auto format = negotiated_format(request.head, cloud_file_formats());
   if (!format.ok()) return problem_response(format.problem(), request);
-  const std::string etag = etag_of({cloud->document.sha256, format.value().name});
+  const auto options = query_file_options(request.head, format.value());
+  if (!options.ok()) return problem_response(options.problem(), request);
+  const std::string etag = etag_of({cloud->document.sha256, format.value().name, options.value().tag()});
   if (is_unchanged(request.head, etag)) return not_modified(etag);
-  return cloud_file_response(service, request, [&cloud] { return cloud->cloud; }, memory_of(*cloud->cloud),
-                             {.format = format.value(), .name = cloud->document.name, .etag = etag});
+  const auto samples = service.clouds.samples_of(*cloud);
+  if (!samples.ok()) return problem_response(samples.problem(), request);
+  return cloud_file_response(service, request, [&] { return samples.value(); }, memory_of(*samples.value()),
+                             {.format = format.value(),
+                              .name = cloud->document.name,
+                              .etag = etag,
+                              .options = options.value(),
+                              .grid = cloud->document.report.grid});
 }
 
 Response delete_cloud(Service& service, const Request& request) {

@@ -16,15 +16,19 @@ std::string content_tag(const StoredImage& image) {
 
 }  // namespace
 
-Response list_images(Service& service, const Request&) {
+Response list_images(Service& service, const Request& request) {
   std::vector<protocol::ImageDocument> documents;
-  for (const SharedImage& image : service.images.list()) documents.push_back(image->document);
+  for (const SharedImage& image : service.images.list())
+    if (request.caller.may_see(image->owner)) documents.push_back(image->document);
   return json_response(protocol::image_list(documents));
 }
 
 Response upload_image(Service& service, const Request& request) {
+  auto quota = service.access.hold(request.caller, Quota::kStoredBytes, request.body.size());
+  if (!quota.ok()) return problem_response(quota.problem(), request);
   const auto begin = std::chrono::steady_clock::now();
-  const auto image = service.images.add(service.decode_image, request.body_bytes());
+  const auto image = service.images.add(service.decode_image, request.body_bytes(), request.caller.token,
+                                        std::move(quota.value()));
   if (!image.ok()) return problem_response(image.problem(), request);
   Response response = json_response(protocol::to_json(image.value()->document), 201);
   response.timings.emplace_back(
@@ -45,10 +49,12 @@ Response get_image_data(Service& service, const Request& request) {
   if (image == nullptr) return not_found(request);
   const std::string etag = etag_of({image->sha256, "data"});
   if (is_unchanged(request.head, etag)) return not_modified(etag);
-  Response response{
-      .content_type = std::string(kMediaType),
-      .body = SharedBytes{.owner = image,
-                          .bytes = std::as_bytes(std::span(image->file.data(), image->file.size()))}};
+  const auto content = service.images.content_of(service.decode_image, *image);
+  if (!content.ok()) return problem_response(content.problem(), request);
+  const std::string& file = content.value()->file;
+  Response response{.content_type = std::string(kMediaType),
+                    .body = SharedBytes{.owner = content.value(),
+                                        .bytes = std::as_bytes(std::span(file.data(), file.size()))}};
   return response.with_header("ETag", etag);
 }
 

@@ -17,7 +17,9 @@ Response get_service(Service& service, const Request& request) {
                           {"sessions", "/v1/sessions"},
                           {"health", "/healthz"},
                           {"readiness", "/readyz"},
-                          {"openapi", "/openapi.json"}}}})
+                          {"openapi", "/openapi.json"},
+                          {"docs", "/docs"},
+                          {"metrics", "/metrics"}}}})
       .with_header("Vary", "Accept");
 }
 
@@ -28,16 +30,24 @@ Response get_health(Service&, const Request&) {
 Response get_readiness(Service& service, const Request& request) {
   if (service.stopping)
     return problem_response({.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"}, request);
+  if (!service.is_ready)
+    return problem_response({.kind = ProblemKind::kOverloaded, .detail = "the server is starting"}, request);
+  if (service.archive != nullptr && service.archive->has_failed())
+    return problem_response(
+        {.kind = ProblemKind::kStorageFailed, .detail = "the disk has failed: nothing can be changed"},
+        request);
   return json_response({{"status", "ready"}});
 }
 
-Response get_info(Service& service, const Request&) {
+Response get_info(Service& service, const Request& request) {
   protocol::InfoDocument info{
       .version = POINTWRIGHT_VERSION,
       .limits = {},
-      .formats = {"draco", "ply", "xyz"},
+      .formats = {"draco", "ply", "xyz", "las", "pcd", "obj"},
       .features = {"preview-stream", "undo", "single-resolution", "images", "model-regions",
-                   "visible-outlines", "recipes", "partial-play", "resampling"}};
+                   "visible-outlines", "recipes", "partial-play", "resampling", "amend", "idempotency-keys",
+                   "tus", "tokens", "shares"},
+      .caller = protocol::to_json(service.access.describe(request.caller))};
   for (const LimitInfo& limit : limit_table())
     info.limits.emplace_back(std::string(limit.name), service.config.limits.*limit.member);
   return json_response(protocol::to_json(info));

@@ -11,4 +11,7 @@ std::string_view openapi_yaml();
 /// The same as JSON.
 const std::string& openapi_json();
 
+/// The page, the style and the script that show it: "docs.html", "docs.css", "docs.js"; else empty.
+std::string_view docs_file(std::string_view name);
+
 }  // namespace pointwright::server

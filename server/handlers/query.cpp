@@ -82,6 +82,20 @@ Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t a
   return attributes;
 }
 
+std::vector<std::string> query_list(const RequestHead& head, std::string_view name) {
+  std::vector<std::string> entries;
+  const std::string text = query_value(head, name).value_or("");
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    std::string entry = text.substr(begin, end - begin);
+    entry.erase(0, std::min(entry.find_first_not_of(' '), entry.size()));
+    entry.erase(entry.find_last_not_of(' ') + 1);
+    if (!entry.empty()) entries.push_back(std::move(entry));
+    begin = end + 1;
+  }
+  return entries;
+}
+
 Outcome<std::optional<std::uint32_t>> query_number(const RequestHead& head, std::string_view name) {
   const auto text = query_value(head, name);
   if (!text) return std::optional<std::uint32_t>();

@@ -25,6 +25,9 @@ std::optional<std::string> query_value(const RequestHead& head, std::string_view
 Outcome<std::uint16_t> query_attributes(const RequestHead& head, std::uint16_t allowed,
                                         std::uint16_t fallback);
 
+/// The entries of a comma-separated parameter, without blanks around them; none where it is absent or empty.
+std::vector<std::string> query_list(const RequestHead& head, std::string_view name);
+
 /// A whole number of at most 9 digits; nullopt where it is not given.
 Outcome<std::optional<std::uint32_t>> query_number(const RequestHead& head, std::string_view name);
 

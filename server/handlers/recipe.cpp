@@ -38,15 +38,21 @@ Response post_recipe(Service& service, const Request& request) {
     const std::string pointer = "/recipe/edits/" + std::to_string(i);
     for (const auto& [name, operations] :
          {std::pair("/zero", &edits[i].zero), std::pair("/one", &edits[i].one)}) {
-      const auto found = find_data(service, *session.value(), pointer + name + "/operations", *operations);
+      const auto found =
+          find_data(service, request.caller, *session.value(), pointer + name + "/operations", *operations);
       if (!found.ok()) return problem_response(found.problem(), request);
     }
   }
-  const auto applied = computed(
-      service.background, [&] { return apply_recipe(*session.value(), recipe.value(), revision.value()); });
+  const auto answer = [&session](const SharedDocument& document) {
+    return session_response(*session.value(), *document);
+  };
+  const auto seal = sealed<SharedDocument>(request, answer);
+  const auto applied = computed(service.background, [&] {
+    return apply_recipe(*session.value(), recipe.value(), revision.value(), seal);
+  });
   if (!applied.ok()) return problem_response(applied.problem(), request);
   if (!applied.value().ok()) return problem_response(applied.value().problem(), request);
-  return session_response(*session.value(), *applied.value().value());
+  return answer_of(request, applied.value().value(), answer);
 }
 
 }  // namespace pointwright::server

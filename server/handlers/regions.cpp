@@ -29,7 +29,9 @@ Response replace_painting(Service& service, const Request& request) {
   if (!session.ok()) return problem_response(session.problem(), request);
   auto operations = parsed_body(request, protocol::parse_painting, large_limits(service));
   if (!operations.ok()) return problem_response(operations.problem(), request);
-  if (const auto found = find_data(service, *session.value(), "/operations", operations.value()); !found.ok())
+  if (const auto found =
+          find_data(service, request.caller, *session.value(), "/operations", operations.value());
+      !found.ok())
     return problem_response(found.problem(), request);
   const auto expected = expected_revision(request.head);
   if (!expected.ok()) return problem_response(expected.problem(), request);
@@ -54,16 +56,20 @@ Response paint_region(Service& service, const Request& request) {
   if (!session.ok()) return problem_response(session.problem(), request);
   auto operation = parsed_body(service, request, protocol::parse_paint_operation);
   if (!operation.ok()) return problem_response(operation.problem(), request);
-  if (const auto found = find_data(service, *session.value(), "", operation.value()); !found.ok())
+  if (const auto found = find_data(service, request.caller, *session.value(), "", operation.value());
+      !found.ok())
     return problem_response(found.problem(), request);
   const auto expected = expected_revision(request.head);
   if (!expected.ok()) return problem_response(expected.problem(), request);
-  const auto painted = session.value()->paint(region_of(request), operation.value(), expected.value());
+  const auto answer = [&session](const Session::Painted& done) {
+    protocol::JsonDocument body = protocol::to_json(session.value()->describe(*done.document));
+    body["changed"] = done.changed;
+    return json_response(body).with_header("ETag", revision_tag(done.document->revision));
+  };
+  const auto painted = session.value()->paint(region_of(request), operation.value(), expected.value(),
+                                              sealed<Session::Painted>(request, answer));
   if (!painted.ok()) return problem_response(painted.problem(), request);
-  const Document& document = *painted.value().document;
-  protocol::JsonDocument body = protocol::to_json(session.value()->describe(document));
-  body["changed"] = painted.value().changed;
-  return json_response(body).with_header("ETag", revision_tag(document.revision));
+  return answer_of(request, painted.value(), answer);
 }
 
 }  // namespace pointwright::server

@@ -1,3 +1,8 @@
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "engine/resampling/cells.h"
 #include "protocol/frames/frame.h"
 #include "server/handlers/cloud_file.h"
 #include "server/handlers/handlers.h"
@@ -67,21 +72,54 @@ Response frame_response(Service& service, const Request& request, Session& sessi
       .with_header("Vary", "Accept");
 }
 
-std::string file_tag(std::uint64_t revision, const Format& format, const View& view) {
-  return etag_of({revision_name(revision), format.name, view_name(view)});
+std::string file_tag(std::uint64_t revision, const CloudFile& file, const View& view) {
+  return etag_of({revision_name(revision), file.format.name, view_name(view), file.options.tag()});
+}
+
+/// Puts a column of the session's in place of the cloud's own of that name.
+void put_scalar(Cloud& cloud, const char* name, std::vector<float> values) {
+  std::erase_if(cloud.scalars, [&](const ScalarAttribute& scalar) { return scalar.name == name; });
+  cloud.scalars.push_back({name, std::move(values)});
+}
+
+/// The surface as a cloud; with the detail of its level and what edits have done to its samples' cells as
+/// scalars where these are asked for by name.
+std::shared_ptr<const Cloud> cloud_of(const Picture& picture, const View& view, const FileOptions& options) {
+  auto cloud = Session::edited_cloud(picture, view.level);
+  const std::array measures{
+      std::pair{"stretch", &StretchColumns::major}, std::pair{"minor_stretch", &StretchColumns::minor},
+      std::pair{"anisotropy", &StretchColumns::anisotropy}, std::pair{"area_change", &StretchColumns::area}};
+  const bool stretches =
+      std::ranges::any_of(measures, [&](const auto& each) { return options.names(each.first); });
+  if (!options.names("detail") && !stretches) return cloud;
+  Cloud with_scalars = *cloud;
+  if (options.names("detail")) {
+    std::vector<float> detail(with_scalars.size(), 0.0F);
+    if (const auto bands = picture.surface->band_count(); bands > 0) {
+      const auto& column = picture.surface->detail[std::min<std::size_t>(view.level, bands - 1)];
+      std::copy_n(column.begin(), detail.size(), detail.begin());
+    }
+    put_scalar(with_scalars, "detail", std::move(detail));
+  }
+  if (stretches) {
+    StretchColumns columns = stretch_columns(*picture.samples->sampling);
+    for (const auto& [name, column] : measures)
+      if (options.names(name)) put_scalar(with_scalars, name, std::move(columns.*column));
+  }
+  return std::make_shared<const Cloud>(std::move(with_scalars));
 }
 
 Response file_response(Service& service, const Request& request, Session& session, const View& view,
-                       const Format& format) {
-  if (const std::string etag = file_tag(session.document()->revision, format, view);
+                       CloudFile file) {
+  if (const std::string etag = file_tag(session.document()->revision, file, view);
       is_unchanged(request.head, etag))
     return not_modified(etag);
   const auto picture = picture_at(service, session, view, false);
   if (!picture.ok()) return problem_response(picture.problem(), request);
+  file.etag = file_tag(picture.value().revision, file, view);
   return cloud_file_response(
-      service, request, [&] { return Session::edited_cloud(picture.value(), view.level); },
-      memory_of(picture.value().samples->cloud()),
-      {.format = format, .name = session.name(), .etag = file_tag(picture.value().revision, format, view)});
+      service, request, [&] { return cloud_of(picture.value(), view, file.options); },
+      memory_of(picture.value().samples->cloud()), file);
 }
 
 /// ?s= and ?timing=; none where neither is given.
@@ -100,7 +138,8 @@ Outcome<std::optional<Play>> query_play(const RequestHead& head) {
 Response get_samples(Service& service, const Request& request) {
   const auto session = session_of(service, request);
   if (!session.ok()) return problem_response(session.problem(), request);
-  if (auto known = check_query(request.head, {"format", "level", "attributes", "s", "timing"}); !known.ok())
+  if (auto known = check_query(request.head, {"format", "level", "attributes", "encoding", "s", "timing"});
+      !known.ok())
     return problem_response(known.problem(), request);
   const auto format = negotiated_format(request.head, sample_formats());
   if (!format.ok()) return problem_response(format.problem(), request);
@@ -129,12 +168,12 @@ Response get_samples(Service& service, const Request& request) {
     return frame_response(service, request, *session.value(), view,
                           session.value()->available_attributes(attributes.value()));
   }
-  if (query_value(request.head, "attributes"))
-    return problem_response({.kind = ProblemKind::kInvalidValue,
-                             .detail = "attributes can be chosen for frames only; files hold all of them",
-                             .errors = {{.pointer = "?attributes", .detail = "for format=frame only"}}},
-                            request);
-  return file_response(service, request, *session.value(), view, format.value());
+  const auto options = query_file_options(request.head, format.value());
+  if (!options.ok()) return problem_response(options.problem(), request);
+  CloudFile file{.format = format.value(), .name = session.value()->name(), .options = options.value()};
+  if (const SharedCloud cloud = service.clouds.find(session.value()->cloud_id()))
+    file.grid = cloud->document.report.grid;
+  return file_response(service, request, *session.value(), view, std::move(file));
 }
 
 }  // namespace pointwright::server

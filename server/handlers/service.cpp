@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
+#include <stdexcept>
 #include <thread>
+
+#include "server/base/sha256.h"
 
 namespace pointwright::server {
 namespace {
@@ -16,22 +20,111 @@ std::size_t pool_threads(const Config& config) {
 
 Service::Service(Config settings, ServiceParts parts)
     : config(std::move(settings)),
+      folder(config.data),
+      database(folder.lasts() ? folder.database() : std::string()),
+      archive(folder.lasts() ? std::make_unique<Archive>(folder, database) : nullptr),
+      answers(database, config.limits.max_kept_answers),
       decode(std::move(parts.decode)),
       decode_image(std::move(parts.decode_image)),
+      decode_file(std::move(parts.decode_file)),
       assets(std::move(parts.assets)),
+      metrics(parts.routes),
       interactive(pool_threads(config), static_cast<int>(config.threads), parts.report_failure),
       background(std::max<std::size_t>(pool_threads(config) / 2, 2), static_cast<int>(config.threads),
                  parts.report_failure),
-      clouds(config.limits),
-      images(config.limits),
-      sessions(config.limits, {.interactive = interactive,
-                               .background = background,
-                               .build = std::move(parts.build),
-                               .resample = std::move(parts.resample)}),
+      access(config.limits, token_file(config)),
+      clouds(config.limits, archive.get(), cloud_loader(decode_file, decode, background, config.limits)),
+      images(config.limits, archive.get()),
+      uploads(config.limits, folder.uploads()),
+      sessions(
+          config.limits, clouds,
+          {.interactive = interactive,
+           .background = background,
+           .build = std::move(parts.build),
+           .resample = std::move(parts.resample),
+           .note_time = [this](const std::string& step, double ms) { metrics.add_time(step, ms / 1e3); }},
+          archive.get()),
       upload_memory(config.limits.max_upload_memory),
       json_memory(config.limits.max_json_memory),
       answer_memory(config.limits.max_answer_memory),
-      streams(config.limits.max_streams) {}
+      streams(config.limits.max_streams),
+      is_ready(archive == nullptr) {}
+
+std::vector<std::string> Service::recover() {
+  std::vector<std::string> notes;
+  if (archive == nullptr) return notes;
+  if (!database.is_sound()) notes.emplace_back("the database is damaged: what cannot be read is not served");
+  try {
+    std::size_t damaged = 0;
+    auto kept_clouds = archive->clouds(damaged);
+    for (KeptCloud& cloud : kept_clouds)
+      cloud.quota = access.hold_again(cloud.owner, Quota::kStoredBytes, cloud.document.bytes);
+    clouds.restore(std::move(kept_clouds));
+    auto kept_images = archive->images(damaged);
+    for (KeptImage& image : kept_images)
+      image.quota = access.hold_again(image.owner, Quota::kStoredBytes, image.document.bytes);
+    images.restore(std::move(kept_images));
+    if (damaged > 0)
+      notes.push_back(std::to_string(damaged) +
+                      " clouds or images are damaged and not served; no file is deleted");
+    auto kept = archive->sessions();
+    for (KeptSession& session : kept)
+      session.quota = std::make_shared<const std::pair<QuotaHold, QuotaHold>>(
+          access.hold_again(session.owner, Quota::kSessions, 1),
+          access.hold_again(session.owner, Quota::kSamples, session.samples));
+    for (const KeptSession& session : kept)
+      if (session.damage) notes.push_back("session " + session.id + " is not served: " + *session.damage);
+    sessions.restore(std::move(kept));
+    if (damaged == 0) archive->sweep();
+  } catch (const DatabaseError& error) {
+    throw std::runtime_error(std::string("the database cannot be read: ") + error.what());
+  }
+  is_ready = true;
+  return notes;
+}
+
+KeptAnswer kept_answer(const KeyedRequest& keyed, const Response& response) {
+  return {.caller = keyed.caller,
+          .key = keyed.key,
+          .fingerprint = keyed.fingerprint,
+          .status = response.status,
+          .content_type = response.content_type,
+          .headers = response.headers,
+          .body = std::get<std::string>(response.body)};
+}
+
+Response answer_once(Service& service, const Request& request, Handler handler) {
+  constexpr std::size_t kMostBytes = 255;
+  const auto key = request.head.header("idempotency-key");
+  if (!key) return handler(service, request);
+  const bool is_plain = !key->empty() && key->size() <= kMostBytes &&
+                        std::all_of(key->begin(), key->end(), [](char c) { return c > ' ' && c <= '~'; });
+  if (!is_plain)
+    return problem_response({.kind = ProblemKind::kMalformedRequest,
+                             .detail = "an Idempotency-Key has 1 to 255 visible ASCII characters"},
+                            request);
+  std::string asked = std::string(method_name(request.head.method)) + "\n" + request.head.path + "\n";
+  for (const auto& [name, value] : request.head.query) asked += name + "=" + value + "\n";
+  asked += sha256_hex(request.body_bytes());
+  request.keyed = std::make_shared<KeyedRequest>(
+      KeyedRequest{.caller = request.caller.token + request.caller.session.value_or(""),
+                   .key = std::string(*key),
+                   .fingerprint = sha256_hex(std::as_bytes(std::span(asked.data(), asked.size())))});
+  auto claim = service.answers.claim(request.keyed->caller, request.keyed->key, request.keyed->fingerprint);
+  if (!claim.ok()) return problem_response(claim.problem(), request);
+  if (auto* kept = std::get_if<KeptAnswer>(&claim.value()))
+    return Response{.status = kept->status,
+                    .content_type = std::move(kept->content_type),
+                    .headers = std::move(kept->headers),
+                    .body = std::move(kept->body)}
+        .with_header("Idempotency-Replayed", "true");
+  Response response = handler(service, request);
+  // Where the effect was none, or does not last either, the answer is kept by itself.
+  if (response.status < 300 && !(request.keyed->answer && service.archive != nullptr))
+    if (auto kept = service.answers.put(kept_answer(*request.keyed, response)); !kept.ok())
+      return problem_response(kept.problem(), request);
+  return response;
+}
 
 Response json_response(const protocol::JsonDocument& document, int status) {
   return {.status = status,
@@ -40,9 +133,10 @@ Response json_response(const protocol::JsonDocument& document, int status) {
 }
 
 Outcome<std::shared_ptr<Session>> session_of(Service& service, const Request& request) {
-  auto session = service.sessions.find(request.captures.at(0));
-  if (session == nullptr)
-    return Problem{.kind = ProblemKind::kNotFound, .detail = "there is no such session"};
+  auto session = service.sessions.get(request.captures.at(0));
+  if (session.ok() && session.value()->is_waking())
+    session.value()->wait_until_built(std::chrono::steady_clock::now() +
+                                      std::chrono::milliseconds(service.config.limits.wake_wait_ms));
   return session;
 }
 

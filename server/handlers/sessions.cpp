@@ -1,21 +1,45 @@
 #include "server/handlers/handlers.h"
 
 namespace pointwright::server {
+namespace {
 
-Response list_sessions(Service& service, const Request&) {
-  std::vector<protocol::SessionSummary> summaries;
-  for (const auto& session : service.sessions.list())
-    summaries.push_back(session->describe(*session->document()).summary);
-  return json_response(protocol::session_list(summaries));
+/// What a session on the cloud takes of the caller's quotas.
+Outcome<std::shared_ptr<const void>> hold_session(Service& service, const Caller& caller,
+                                                  const std::string& cloud_id) {
+  const SharedCloud cloud = service.clouds.find(cloud_id);
+  // create() says so.
+  if (cloud == nullptr || !caller.may_see(cloud->owner)) return std::shared_ptr<const void>();
+  auto session = service.access.hold(caller, Quota::kSessions, 1);
+  if (!session.ok()) return session.problem();
+  auto samples = service.access.hold(caller, Quota::kSamples, cloud->document.report.sample_count);
+  if (!samples.ok()) return samples.problem();
+  return std::shared_ptr<const void>(
+      std::make_shared<const std::pair<QuotaHold, QuotaHold>>(session.value(), samples.value()));
+}
+
+}  // namespace
+
+Response list_sessions(Service& service, const Request& request) {
+  const auto may_see = [&](const std::string& owner, const std::string& id) {
+    return request.caller.may_see_session(owner, id);
+  };
+  return json_response(protocol::session_list(service.sessions.summaries(may_see)));
 }
 
 Response create_session(Service& service, const Request& request) {
   const auto body = parsed_body(service, request, protocol::parse_create_session);
   if (!body.ok()) return problem_response(body.problem(), request);
-  const auto session = service.sessions.create(service.clouds, body.value());
+  const auto quota = hold_session(service, request.caller, body.value().cloud);
+  if (!quota.ok()) return problem_response(quota.problem(), request);
+  using Made = std::shared_ptr<Session>;
+  const auto answer = [](const Made& session) {
+    return session_response(*session, *session->document(), 202)
+        .with_header("Location", "/v1/sessions/" + session->id());
+  };
+  const auto session =
+      service.sessions.create(body.value(), request.caller, quota.value(), sealed<Made>(request, answer));
   if (!session.ok()) return problem_response(session.problem(), request);
-  return session_response(*session.value(), *session.value()->document(), 202)
-      .with_header("Location", "/v1/sessions/" + session.value()->id());
+  return answer_of(request, session.value(), answer);
 }
 
 Response get_session(Service& service, const Request& request) {
@@ -24,11 +48,24 @@ Response get_session(Service& service, const Request& request) {
   return session_response(*session.value(), *session.value()->document());
 }
 
+Response patch_session(Service& service, const Request& request) {
+  const auto session = session_of(service, request);
+  if (!session.ok()) return problem_response(session.problem(), request);
+  const auto change = parsed_body(service, request, protocol::parse_session_change);
+  if (!change.ok()) return problem_response(change.problem(), request);
+  const auto expected = expected_revision(request.head);
+  if (!expected.ok()) return problem_response(expected.problem(), request);
+  const auto renamed = session.value()->rename(change.value().name, expected.value());
+  if (!renamed.ok()) return problem_response(renamed.problem(), request);
+  return session_response(*session.value(), *renamed.value());
+}
+
 Response delete_session(Service& service, const Request& request) {
   const auto expected = expected_revision(request.head);
   if (!expected.ok()) return problem_response(expected.problem(), request);
   if (auto removed = service.sessions.remove(request.captures.at(0), expected.value()); !removed.ok())
     return problem_response(removed.problem(), request);
+  service.access.shares.forget(request.captures.at(0));
   return {.status = 204};
 }
 

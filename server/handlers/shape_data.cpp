@@ -5,8 +5,8 @@ namespace pointwright::server {
 using protocol::Problem;
 using protocol::ProblemKind;
 
-Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
-                        PaintOperation& operation) {
+Outcome<Done> find_data(const Service& service, const Caller& caller, const Session& session,
+                        const std::string& pointer, PaintOperation& operation) {
   const auto refused = [&](const char* member, const char* detail) {
     return Problem{.kind = ProblemKind::kInvalidValue,
                    .detail = detail,
@@ -14,23 +14,29 @@ Outcome<Done> find_data(const Service& service, const Session& session, const st
   };
   if (auto* shape = std::get_if<ImageShape>(&operation.shape)) {
     const SharedImage image = service.images.find(shape->source);
-    if (image == nullptr) return refused("/shape/image", "there is no such image");
-    shape->image = image->image;
+    if (image == nullptr || !caller.may_see(image->owner))
+      return refused("/shape/image", "there is no such image");
+    const auto content = service.images.content_of(service.decode_image, *image);
+    if (!content.ok()) return content.problem();
+    shape->image = {content.value(), &content.value()->image};
   }
   if (auto* shape = std::get_if<ModelShape>(&operation.shape)) {
     const SharedCloud cloud = service.clouds.find(shape->source);
-    if (cloud == nullptr) return refused("/shape/cloud", "there is no such cloud");
-    shape->cloud = cloud->cloud;
+    if (cloud == nullptr || !caller.may_see(cloud->owner))
+      return refused("/shape/cloud", "there is no such cloud");
+    auto samples = service.clouds.samples_of(*cloud);
+    if (!samples.ok()) return samples.problem();
+    shape->cloud = std::move(samples.value());
   }
   if (needs_texcoord(operation.shape) && session.cloud().texcoord.empty())
     return refused("/shape/projection", "the session's cloud has no texture coordinates");
   return Done{};
 }
 
-Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
-                        std::vector<PaintOperation>& operations) {
+Outcome<Done> find_data(const Service& service, const Caller& caller, const Session& session,
+                        const std::string& pointer, std::vector<PaintOperation>& operations) {
   for (std::size_t i = 0; i < operations.size(); ++i) {
-    if (auto found = find_data(service, session, pointer + "/" + std::to_string(i), operations[i]);
+    if (auto found = find_data(service, caller, session, pointer + "/" + std::to_string(i), operations[i]);
         !found.ok())
       return found;
   }

@@ -10,11 +10,11 @@
 namespace pointwright::server {
 
 /// Puts in what the operation's shape names. `pointer`: to the operation.
-/// Problem: kInvalidValue where there is no such thing, or no texture coordinates to map an image by
-Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
-                        PaintOperation& operation);
+/// Problem: kInvalidValue where there is nothing such for the caller, or no texture coordinates to map by
+Outcome<Done> find_data(const Service& service, const Caller& caller, const Session& session,
+                        const std::string& pointer, PaintOperation& operation);
 /// The same for a list. `pointer`: to the list.
-Outcome<Done> find_data(const Service& service, const Session& session, const std::string& pointer,
-                        std::vector<PaintOperation>& operations);
+Outcome<Done> find_data(const Service& service, const Caller& caller, const Session& session,
+                        const std::string& pointer, std::vector<PaintOperation>& operations);
 
 }  // namespace pointwright::server

@@ -1,5 +1,6 @@
 #include "server/http/connection.h"
 
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -12,12 +13,14 @@
 #include <array>
 #include <cerrno>
 #include <thread>
+#include <vector>
 
 namespace pointwright::server {
 namespace {
 
 constexpr std::size_t kLingerDropBytes = 256 * 1024;
 constexpr std::size_t kReadBytes = 64 * 1024;
+constexpr std::size_t kPieceBytes = 256 * 1024;
 constexpr std::uint64_t kHoldBytes = 4U << 20U;
 constexpr std::size_t kMostPieces = 4;  // in one call
 
@@ -35,6 +38,12 @@ bool wait_for(int descriptor, short events, Clock::time_point deadline) {
     if (ready < 0 && errno != EINTR) return true;  // let the call itself report what is wrong
     if (Clock::now() >= deadline) return false;
   }
+}
+
+/// What came buys time at the least rate, but never more than the grace: nobody saves up for a pause.
+Clock::time_point paced(Clock::time_point deadline, std::uint64_t count, Connection::BodyPace pace) {
+  const std::chrono::nanoseconds bought(count * 1'000'000'000U / pace.least_rate);
+  return std::min(deadline + bought, Clock::now() + pace.grace);
 }
 
 /// What is left of the pieces without their first `count` bytes.
@@ -120,10 +129,34 @@ Connection::BodyStatus Connection::read_body(std::uint64_t length, BodyPace pace
     body.resize(before + static_cast<std::size_t>(std::max<std::ptrdiff_t>(count, 0)));
     if (count < 0) return BodyStatus::kTimedOut;
     if (count == 0) return BodyStatus::kClosed;
-    // What came buys time at the least rate, but never more than the grace: nobody saves up for a pause.
-    const std::chrono::nanoseconds bought(static_cast<std::uint64_t>(count) * 1'000'000'000U /
-                                          pace.least_rate);
-    deadline = std::min(deadline + bought, Clock::now() + pace.grace);
+    deadline = paced(deadline, static_cast<std::uint64_t>(count), pace);
+  }
+  return BodyStatus::kComplete;
+}
+
+Connection::BodyStatus Connection::stream_body(std::uint64_t length, BodyPace pace,
+                                               const std::function<bool(std::span<const std::byte>)>& take,
+                                               std::uint64_t& count) {
+  count = 0;
+  const auto hand_over = [&](const char* data, std::size_t size) {
+    count += size;
+    return take(std::as_bytes(std::span(data, size)));
+  };
+  const auto early = static_cast<std::size_t>(std::min<std::uint64_t>(length, pending_.size()));
+  if (early > 0 && !hand_over(pending_.data(), early)) return BodyStatus::kNoRoom;
+  pending_.clear();
+  std::vector<char> piece(static_cast<std::size_t>(std::min<std::uint64_t>(length - count, kPieceBytes)));
+  Clock::time_point deadline = Clock::now() + pace.grace;
+  while (count < length) {
+    if (Clock::now() >= deadline) return BodyStatus::kTimedOut;
+    const auto want = static_cast<std::size_t>(std::min<std::uint64_t>(length - count, piece.size()));
+    const std::ptrdiff_t got = receive(piece.data(), want, deadline);
+    if (got < 0) return BodyStatus::kTimedOut;
+    if (got == 0) return BodyStatus::kClosed;
+    const auto begin = Clock::now();
+    if (!hand_over(piece.data(), static_cast<std::size_t>(got))) return BodyStatus::kNoRoom;
+    // What the disk takes is not the peer's fault; what came buys time at the least rate.
+    deadline = paced(deadline + (Clock::now() - begin), static_cast<std::uint64_t>(got), pace);
   }
   return BodyStatus::kComplete;
 }
@@ -159,6 +192,19 @@ bool Connection::write_all(std::span<std::span<const std::byte>> pieces, Clock::
 
 bool Connection::write_all(std::string_view text, Clock::time_point deadline) {
   return write_all(std::as_bytes(std::span(text.data(), text.size())), deadline);
+}
+
+std::string Connection::peer_address() const {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (::getpeername(descriptor_, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
+  const void* number = nullptr;
+  if (address.ss_family == AF_INET) number = &reinterpret_cast<const sockaddr_in*>(&address)->sin_addr;
+  if (address.ss_family == AF_INET6) number = &reinterpret_cast<const sockaddr_in6*>(&address)->sin6_addr;
+  if (number == nullptr || ::inet_ntop(address.ss_family, number, text.data(), text.size()) == nullptr)
+    return {};
+  return text.data();
 }
 
 bool Connection::is_peer_gone() const {

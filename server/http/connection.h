@@ -37,6 +37,11 @@ class Connection {
   BodyStatus read_body(std::uint64_t length, BodyPace pace, const std::function<bool(std::uint64_t)>& hold,
                        std::string& body);
 
+  /// The same, piece by piece to `take` instead of into memory; at most one piece of 256 KiB is held. Where
+  /// `take` refuses one, reading ends with kNoRoom. `count`: the bytes that were taken.
+  BodyStatus stream_body(std::uint64_t length, BodyPace pace,
+                         const std::function<bool(std::span<const std::byte>)>& take, std::uint64_t& count);
+
   /// Writes everything before the deadline. False: the peer is gone or too slow; the connection is then
   /// broken.
   bool write_all(std::span<const std::byte> bytes, Clock::time_point deadline);
@@ -44,6 +49,8 @@ class Connection {
   /// The same for a few pieces in a row, uncopied.
   bool write_all(std::span<std::span<const std::byte>> pieces, Clock::time_point deadline);
 
+  /// The address of the other side, without a port; empty where the system does not tell.
+  [[nodiscard]] std::string peer_address() const;
   [[nodiscard]] bool is_broken() const { return broken_; }
   /// Whether the peer has closed or reset its side. Never blocks.
   [[nodiscard]] bool is_peer_gone() const;

@@ -6,6 +6,8 @@
 #include <cstdio>
 
 #include "server/base/random_id.h"
+#include "server/base/request_scope.h"
+#include "server/http/cors.h"
 #include "server/http/problem_response.h"
 
 namespace pointwright::server {
@@ -81,7 +83,8 @@ bool Exchange::read_head() {
                       .limit = static_cast<double>(context_.options.head.max_bytes)};
       break;
   }
-  if (const auto* head = std::get_if<RequestHead>(&head_)) {
+  if (auto* head = std::get_if<RequestHead>(&head_)) {
+    head->peer = connection_.peer_address();
     if (const auto id = head->header("x-request-id"); id && is_well_formed_id(*id)) request_id_ = *id;
     log_.method = method_name(head->method);
     log_.path = head->path;
@@ -113,23 +116,40 @@ std::optional<Problem> Exchange::check_body(const BodyPolicy& policy) const {
   const bool is_json = policy.kind == BodyPolicy::Kind::kJson || policy.kind == BodyPolicy::Kind::kLargeJson;
   if (is_json && type != "application/json")
     return Problem{.kind = ProblemKind::kUnsupportedMediaType, .detail = "send application/json"};
-  if (policy.kind == BodyPolicy::Kind::kCloud && type != "model/x-draco" && type != "application/x-ply" &&
-      type != "text/plain" && type != "application/octet-stream")
-    return Problem{
-        .kind = ProblemKind::kUnsupportedMediaType,
-        .detail = "send model/x-draco, application/x-ply, text/plain (XYZ) or application/octet-stream"};
+  constexpr std::array<std::string_view, 8> kCloudTypes = {"application/json",  "application/octet-stream",
+                                                           "application/x-ply", "application/vnd.las",
+                                                           "model/obj",         "model/x-draco",
+                                                           "model/x-pcd",       "text/plain"};
+  if (policy.kind == BodyPolicy::Kind::kCloud &&
+      std::find(kCloudTypes.begin(), kCloudTypes.end(), type) == kCloudTypes.end())
+    return Problem{.kind = ProblemKind::kUnsupportedMediaType,
+                   .detail =
+                       "send application/octet-stream, model/x-draco, application/x-ply, "
+                       "application/vnd.las, model/x-pcd, model/obj, text/plain (XYZ), or "
+                       "application/json with an upload. LAZ and E57 are not read: convert them to LAS "
+                       "first, with laszip, PDAL or CloudCompare"};
+  if (policy.kind == BodyPolicy::Kind::kUpload && length > 0 && type != "application/offset+octet-stream")
+    return Problem{.kind = ProblemKind::kUnsupportedMediaType,
+                   .detail = "send application/offset+octet-stream"};
   if (policy.kind == BodyPolicy::Kind::kImage && type != "image/png")
     return Problem{.kind = ProblemKind::kUnsupportedMediaType, .detail = "send image/png"};
-  if (length > policy.max_bytes)
+  const bool names_upload = policy.kind == BodyPolicy::Kind::kCloud && type == "application/json";
+  const std::uint64_t most = names_upload ? policy.max_json_bytes : policy.max_bytes;
+  if (length > most)
     return Problem{.kind = ProblemKind::kBodyTooLarge,
                    .detail = "the body is larger than this route takes",
-                   .limit = static_cast<double>(policy.max_bytes),
+                   .limit = static_cast<double>(most),
                    .actual = static_cast<double>(length)};
   return std::nullopt;
 }
 
-std::optional<Problem> Exchange::read_body(const Endpoint& endpoint, std::string& body) {
+std::optional<Problem> Exchange::read_body(const Endpoint& endpoint, Request& request) {
   if (endpoint.body.kind == BodyPolicy::Kind::kNone) return std::nullopt;
+  if (endpoint.open_target) {
+    auto target = endpoint.open_target(request);
+    if (!target.ok()) return target.problem();
+    request.target = std::move(target.value());
+  }
   const RequestHead& head = std::get<RequestHead>(head_);
   const std::uint64_t length = head.content_length.value_or(0);
   const HttpOptions& options = context_.options;
@@ -141,10 +161,20 @@ std::optional<Problem> Exchange::read_body(const Endpoint& endpoint, std::string
     body_memory_.push_back(endpoint.body_memory->hold(bytes));
     return body_memory_.back() != nullptr;
   };
-  const auto status = connection_.read_body(
-      length, {.grace = options.body_grace, .least_rate = options.least_body_rate}, hold, body);
-  log_.request_bytes += body.size();
+  const Connection::BodyPace pace{.grace = options.body_grace, .least_rate = options.least_body_rate};
+  std::uint64_t count = 0;
+  auto status = Connection::BodyStatus::kComplete;
+  if (request.target != nullptr) {
+    const auto take = [&](std::span<const std::byte> bytes) { return request.target->write(bytes); };
+    status = connection_.stream_body(length, pace, take, count);
+  } else {
+    status = connection_.read_body(length, pace, hold, request.body);
+    count = request.body.size();
+  }
+  log_.request_bytes += count;
   if (status == Connection::BodyStatus::kComplete) return std::nullopt;
+  if (status == Connection::BodyStatus::kNoRoom && request.target != nullptr)
+    return request.target->problem();
   if (status == Connection::BodyStatus::kTimedOut)
     return Problem{.kind = ProblemKind::kRequestTimeout, .detail = "the body came too slowly"};
   if (status == Connection::BodyStatus::kNoRoom)
@@ -154,7 +184,7 @@ std::optional<Problem> Exchange::read_body(const Endpoint& endpoint, std::string
   return Problem{.kind = ProblemKind::kMalformedRequest,
                  .detail = "the body ended before its Content-Length",
                  .limit = std::nullopt,
-                 .actual = static_cast<double>(body.size())};
+                 .actual = static_cast<double>(count)};
 }
 
 Response Exchange::dispatch() {
@@ -166,18 +196,30 @@ Response Exchange::dispatch() {
   if (context_.stopping)
     return refuse({.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"});
   auto& head = std::get<RequestHead>(head_);
-  if (auto problem = check_origin(head, context_.options.allowed_hosts)) return refuse(*problem);
+  if (auto problem = check_origin(head, context_.options.allowed_hosts, context_.options.cors_origins))
+    return refuse(*problem);
+  if (is_preflight(head)) return preflight(head, context_.options.cors_origins);
   Resolution resolution = context_.resolver(head, request_id_);
   if (auto* response = std::get_if<Response>(&resolution)) return std::move(*response);
   auto& endpoint = std::get<Endpoint>(resolution);
   log_.route = endpoint.route;
+  log_.token = endpoint.caller.token;
   if (auto problem = check_body(endpoint.body)) return refuse(*problem);
-  Request request{.head = head, .id = request_id_, .captures = std::move(endpoint.captures), .body = {}};
-  if (auto problem = read_body(endpoint, request.body)) return refuse(*problem);
-  return endpoint.handle(request);
+  Request request{.head = head,
+                  .id = request_id_,
+                  .captures = std::move(endpoint.captures),
+                  .body = {},
+                  .caller = std::move(endpoint.caller)};
+  if (auto problem = read_body(endpoint, request)) return refuse(*problem);
+  // Beside what handlers tell of their own steps: what is left of the total is the reading of the body.
+  const Clock::time_point begin = Clock::now();
+  Response response = endpoint.handle(request);
+  response.timings.emplace_back("handle", milliseconds_since(begin));
+  return response;
 }
 
 Response Exchange::answer() {
+  const RequestScope scope(request_id_);
   Response response;
   try {
     response = dispatch();
@@ -195,6 +237,8 @@ Response Exchange::answer() {
   }
   log_.status = response.status;
   response.timings.emplace_back("total", milliseconds_since(begin_));
+  log_.timings = response.timings;
+  log_.is_stream = std::holds_alternative<StreamBody>(response.body);
   response.with_header("X-Request-Id", request_id_)
       .with_header("Server-Timing", server_timing(response.timings))
       .with_header("Content-Security-Policy", std::string(kContentSecurityPolicy))
@@ -203,11 +247,18 @@ Response Exchange::answer() {
       .with_header("Cross-Origin-Resource-Policy", "same-origin")
       .with_header("Cross-Origin-Opener-Policy", "same-origin")
       .with_header("Accept-Ranges", "none");
+  // What the protocol of uploads wants of every answer, those included that no handler made.
+  if (const auto* head = std::get_if<RequestHead>(&head_)) {
+    if (head->path.starts_with("/v1/uploads") && !has_header(response, "Tus-Resumable"))
+      response.with_header("Tus-Resumable", "1.0.0");
+    allow_reading(response, *head, context_.options.cors_origins);
+  }
   if (!has_header(response, "Cache-Control")) response.with_header("Cache-Control", "no-store");
   return response;
 }
 
 void Exchange::begin_answer(std::uint64_t bytes) {
+  log_.response_bytes = bytes;
   const HttpOptions& options = context_.options;
   write_deadline_ = Clock::now() + options.write_grace + time_for(bytes, options.least_write_rate);
 }
@@ -218,6 +269,7 @@ void Exchange::begin_stream_write() {
 
 bool Exchange::write_chunk(std::span<const std::byte> bytes) {
   begin_stream_write();
+  log_.response_bytes += bytes.size();
   std::array<char, 2 * sizeof(std::size_t) + 2> head{};
   char* end = std::to_chars(head.data(), head.data() + head.size(), bytes.size(), 16).ptr;
   *end++ = '\r';

@@ -50,6 +50,7 @@ class Exchange {
   [[nodiscard]] bool is_peer_gone() const { return connection_.is_peer_gone(); }
   [[nodiscard]] bool is_stopping() const { return context_.stopping; }
 
+  [[nodiscard]] const std::string& request_id() const { return request_id_; }
   void note_failure(std::string text) { log_.failure = std::move(text); }
   /// Writes the log line.
   void finish();
@@ -58,7 +59,7 @@ class Exchange {
   Response dispatch();
   Response refuse(const Problem& problem);
   std::optional<Problem> check_body(const BodyPolicy& policy) const;
-  std::optional<Problem> read_body(const Endpoint& endpoint, std::string& body);
+  std::optional<Problem> read_body(const Endpoint& endpoint, Request& request);
 
   const ExchangeContext& context_;
   Connection& connection_;

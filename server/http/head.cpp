@@ -230,7 +230,8 @@ bool is_allowed_host(std::string_view host, const std::vector<std::string>& allo
   return std::find(allowed_hosts.begin(), allowed_hosts.end(), name) != allowed_hosts.end();
 }
 
-std::optional<Problem> check_origin(const RequestHead& head, const std::vector<std::string>& allowed_hosts) {
+std::optional<Problem> check_origin(const RequestHead& head, const std::vector<std::string>& allowed_hosts,
+                                    const std::vector<std::string>& cors_origins) {
   const std::string host = lower(head.header("host").value_or(""));
   if (!is_allowed_host(host, allowed_hosts))
     return Problem{
@@ -240,7 +241,8 @@ std::optional<Problem> check_origin(const RequestHead& head, const std::vector<s
   for (const NameValue& entry : head.headers) {
     if (entry.first != "origin") continue;
     const std::string origin = lower(entry.second);
-    if (origin != "http://" + host && origin != "https://" + host)
+    const bool is_listed = std::find(cors_origins.begin(), cors_origins.end(), origin) != cors_origins.end();
+    if (!is_listed && origin != "http://" + host && origin != "https://" + host)
       return Problem{.kind = ProblemKind::kOriginNotAllowed,
                      .detail = "changes are taken from this server's own pages only"};
   }

@@ -33,8 +33,9 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
 /// listed.
 bool is_allowed_host(std::string_view host, const std::vector<std::string>& allowed_hosts);
 
-/// Host allow-list on every request; Origin absent or the request's own host on state changes (403
-/// otherwise).
-std::optional<Problem> check_origin(const RequestHead& head, const std::vector<std::string>& allowed_hosts);
+/// Host allow-list on every request; Origin absent, the request's own host or one of the listed origins on
+/// state changes (403 otherwise).
+std::optional<Problem> check_origin(const RequestHead& head, const std::vector<std::string>& allowed_hosts,
+                                    const std::vector<std::string>& cors_origins = {});
 
 }  // namespace pointwright::server

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <thread>
 
+#include "server/base/request_scope.h"
 #include "server/http/connection.h"
 #include "server/http/exchange.h"
 #include "server/http/http_library.h"
@@ -145,6 +146,7 @@ void fill(httplib::Response& out, Response response, Exchange& exchange) {
                                      [body = std::move(*stream), &exchange](size_t, httplib::DataSink& sink) {
                                        // An exception that left a provider would end the process.
                                        try {
+                                         const RequestScope scope(exchange.request_id());
                                          ChunkSink target(exchange);
                                          body(target);
                                        } catch (const std::exception& error) {

@@ -18,6 +18,7 @@ struct HttpOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = 0;  ///< 0: any free one
   std::vector<std::string> allowed_hosts;
+  std::vector<std::string> cors_origins;  ///< whose pages may ask and read the answers
   HeadLimits head;
   std::chrono::milliseconds head_deadline{5000};
   std::chrono::milliseconds body_grace{10'000};  ///< a body may pause this long, and then owes the least rate
@@ -35,6 +36,10 @@ struct RequestLog {
   int status = 0;
   double duration_ms = 0.0;
   std::uint64_t request_bytes = 0;
+  std::uint64_t response_bytes = 0;                     ///< of the body
+  bool is_stream = false;                               ///< it ended when its reader left, or the server did
+  std::vector<std::pair<std::string, double>> timings;  ///< as Server-Timing tells them, in milliseconds
+  std::string token;                                    ///< the id of the caller's
   std::string failure;  ///< the text of an exception that escaped a handler; never sent to the client
 };
 

@@ -14,6 +14,8 @@
 #include <vector>
 
 #include "server/base/budget.h"
+#include "server/base/caller.h"
+#include "server/base/outcome.h"
 
 namespace pointwright::server {
 
@@ -32,6 +34,7 @@ struct RequestHead {
   std::vector<NameValue> query;    ///< decoded, in order
   std::vector<NameValue> headers;  ///< names in lower case, values trimmed; hostile bytes: never echo them
   std::optional<std::uint64_t> content_length;
+  std::string peer;  ///< the address that the connection came from, without a port
 
   /// The value of a header (name in lower case); the first one where it is repeated.
   [[nodiscard]] std::optional<std::string_view> header(std::string_view name) const;
@@ -39,11 +42,25 @@ struct RequestHead {
   [[nodiscard]] std::string media_type() const;
 };
 
+/// Where a body goes piece by piece instead of into memory. Used by the connection's thread alone. Where the
+/// body ends early it is destroyed without its handler having been called.
+class BodyTarget {
+ public:
+  virtual ~BodyTarget() = default;
+  /// False: the rest of the body cannot be taken; problem() says why.
+  virtual bool write(std::span<const std::byte> bytes) = 0;
+  [[nodiscard]] virtual protocol::Problem problem() const = 0;
+};
+struct KeyedRequest;
+
 struct Request {
   RequestHead head;
   std::string id;                     ///< X-Request-Id: the client's where it is well-formed, else a new one
   std::vector<std::string> captures;  ///< what the placeholders of the route matched
   std::string body;
+  std::shared_ptr<BodyTarget> target = nullptr;  ///< where the body went, for routes that have one
+  Caller caller = {};
+  mutable std::shared_ptr<KeyedRequest> keyed = nullptr;  ///< where it has an Idempotency-Key
 
   [[nodiscard]] std::span<const std::byte> body_bytes() const {
     return std::as_bytes(std::span(body.data(), body.size()));
@@ -84,11 +101,20 @@ struct Response {
   }
 };
 
+/// A request that is answered once, however often it comes.
+struct KeyedRequest {
+  std::string caller;
+  std::string key;
+  std::string fingerprint;
+  std::optional<Response> answer = std::nullopt;  ///< once it was kept with the change
+};
+
 /// What the body of a route may be.
 struct BodyPolicy {
-  enum class Kind { kNone, kJson, kLargeJson, kCloud, kImage };
+  enum class Kind { kNone, kJson, kLargeJson, kCloud, kImage, kUpload };
   Kind kind = Kind::kNone;
   std::uint64_t max_bytes = 0;
+  std::uint64_t max_json_bytes = 0;  ///< kCloud: of a document that names an upload
 };
 
 /// The outcome of looking a request up: either its answer at once, or what handles it and which body it
@@ -100,6 +126,9 @@ struct Endpoint {
   std::function<Response(const Request&)> handle;
   /// What the bytes of the body are held from as they arrive, until the request is answered; null: nothing.
   Budget* body_memory = nullptr;
+  /// Makes what takes the body, before it is read; null: it is held in memory.
+  std::function<Outcome<std::shared_ptr<BodyTarget>>(const Request&)> open_target = {};
+  Caller caller = {};  ///< who asks
 };
 using Resolution = std::variant<Response, Endpoint>;
 

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <string_view>
@@ -66,7 +67,7 @@ void reset_signals(SpawnPlan& plan) {
   plan.require(posix_spawnattr_setflags(&plan.attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF));
 }
 
-void set_descriptors(SpawnPlan& plan, const std::array<Descriptor, 3>& far) {
+void set_descriptors(SpawnPlan& plan, const std::vector<Descriptor>& far) {
   plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0));
   plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0));
   // A sanitizer's report is worth having.
@@ -76,7 +77,7 @@ void set_descriptors(SpawnPlan& plan, const std::array<Descriptor, 3>& far) {
   for (std::size_t i = 0; i < far.size(); ++i) {
     plan.require(posix_spawn_file_actions_adddup2(&plan.actions, far[i].get(), static_cast<int>(3 + i)));
   }
-  plan.require(posix_spawn_file_actions_addclosefrom_np(&plan.actions, 6));
+  plan.require(posix_spawn_file_actions_addclosefrom_np(&plan.actions, static_cast<int>(3 + far.size())));
 }
 
 }  // namespace
@@ -94,9 +95,9 @@ void Descriptor::close() {
 }
 
 std::optional<pid_t> start_child(const std::string& program, const char* argument,
-                                 const std::array<int, 3>& descriptors) {
-  // Copies far up: dup2 onto 3, 4 and 5 must not hit one that is still to be copied.
-  std::array<Descriptor, 3> far;
+                                 const std::vector<int>& descriptors) {
+  // Copies far up: dup2 onto 3, 4, … must not hit one that is still to be copied.
+  std::vector<Descriptor> far(descriptors.size());
   for (std::size_t i = 0; i < far.size(); ++i) {
     far[i] = Descriptor(fcntl(descriptors[i], F_DUPFD_CLOEXEC, kFarDescriptor));
     if (!far[i].is_open()) return std::nullopt;

@@ -4,10 +4,10 @@
 
 #include <sys/types.h>
 
-#include <array>
 #include <chrono>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "engine/core/execution_context.h"
 #include "engine/core/result.h"
@@ -41,11 +41,11 @@ struct ChildEnd {
   int status = 0;            ///< its exit status
 };
 
-/// Starts `program argument` with standard input and output on /dev/null, the given descriptors as 3, 4, 5,
+/// Starts `program argument` with standard input and output on /dev/null, the given descriptors as 3, 4, …,
 /// no other descriptor, default signals, and an environment of what the loader and sanitizers need. Safe in a
 /// process with threads.
 std::optional<pid_t> start_child(const std::string& program, const char* argument,
-                                 const std::array<int, 3>& descriptors);
+                                 const std::vector<int>& descriptors);
 
 /// Waits until the child is gone, whatever it takes: past the deadline (or once the context is cancelled) it
 /// is killed. `alive` reads end-of-file when the child is gone.

@@ -6,12 +6,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
 
 #include "server/ingest/child_process.h"
 #include "server/ingest/exchange_record.h"
+#include "server/ingest/files.h"
 
 namespace pointwright {
 namespace {
@@ -26,16 +28,6 @@ Error too_large(std::string message) {
 
 Descriptor memory_file(const char* name) {
   return Descriptor(memfd_create(name, MFD_CLOEXEC));
-}
-
-bool write_all(int file, std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = write(file, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    bytes = bytes.subspan(static_cast<std::size_t>(written));
-  }
-  return true;
 }
 
 // A file's content in our address space while it lives.
@@ -88,10 +80,19 @@ Error failure(const ChildEnd& end, const ConfineLimits& limits) {
                .field = {}};
 }
 
+// The bytes to decode: a file of ours, or what is in memory and must be written to one.
+struct Input {
+  int file = -1;
+  std::span<const std::byte> bytes = {};
+  std::uint64_t byte_count = 0;
+};
+Input input_of(std::span<const std::byte> bytes) {
+  return {.bytes = bytes, .byte_count = bytes.size()};
+}
+
 // Adds what every request says.
-DecodeRequest with_limits(DecodeRequest request, std::span<const std::byte> bytes,
-                          const ConfineLimits& limits) {
-  request.byte_count = bytes.size();
+DecodeRequest with_limits(DecodeRequest request, const Input& input, const ConfineLimits& limits) {
+  request.byte_count = input.byte_count;
   request.memory_bytes = limits.memory_bytes;
   request.cpu_seconds = static_cast<std::uint64_t>(std::ceil(std::max(1.0, limits.deadline_seconds)));
   return request;
@@ -99,29 +100,32 @@ DecodeRequest with_limits(DecodeRequest request, std::span<const std::byte> byte
 
 // Starts a decoder, waits for its end and hands its answer to `read`. Read: Result<T>(bytes of the answer).
 template <typename Read>
-auto decode_in_child(const DecodeRequest& request, std::span<const std::byte> bytes,
-                     const ConfineLimits& limits, const ExecutionContext* context, const Read& read)
-    -> decltype(read(bytes)) {
-  if (bytes.empty())
+auto decode_in_child(const DecodeRequest& request, const Input& input, const ConfineLimits& limits,
+                     const ExecutionContext* context, const Read& read) -> decltype(read(input.bytes)) {
+  if (input.byte_count == 0)
     return Error{.code = ErrorCode::kEmptyCloud, .message = "there are no bytes", .field = {}};
   DecodeSlots::Lease lease;
   if (limits.slots != nullptr) {
     lease = limits.slots->acquire(std::chrono::duration<double>(limits.queue_seconds));
     if (!lease) return decoder_error("every decoder is busy; none came free in time");
   }
-  const Descriptor input = memory_file("pointwright-upload");
+  const Descriptor record = memory_file("pointwright-request");
+  const Descriptor content = input.file < 0 ? memory_file("pointwright-upload") : Descriptor();
   const Descriptor output = memory_file("pointwright-answer");
   std::array<int, 2> ends{-1, -1};
-  if (!input.is_open() || !output.is_open() || pipe2(ends.data(), O_CLOEXEC) != 0) {
+  if (!record.is_open() || (input.file < 0 && !content.is_open()) || !output.is_open() ||
+      pipe2(ends.data(), O_CLOEXEC) != 0) {
     return decoder_error("there are no descriptors left for a decoder");
   }
   const Descriptor alive(ends[0]);
   Descriptor held(ends[1]);
-  if (!write_all(input.get(), std::as_bytes(std::span(&request, 1))) || !write_all(input.get(), bytes)) {
+  if (!write_all(record.get(), std::as_bytes(std::span(&request, 1))) ||
+      (input.file < 0 && !write_all(content.get(), input.bytes))) {
     return decoder_error("there is no memory left to hand the file to a decoder");
   }
   const auto child =
-      start_child(limits.program, kDecodeChildArgument, {input.get(), output.get(), held.get()});
+      start_child(limits.program, kDecodeChildArgument,
+                  {record.get(), output.get(), held.get(), input.file < 0 ? content.get() : input.file});
   held.close();  // the child's copy alone keeps the pipe open
   if (!child) return decoder_error("no decoder could be started");
   const ChildEnd end =
@@ -143,15 +147,16 @@ bool fits(const Image& image, const ImageLimits& limits) {
 
 }  // namespace
 
-Result<ImportedCloud> decode_confined(std::span<const std::byte> bytes, CloudFormat format,
-                                      const ImportParams& params, const ConfineLimits& limits,
-                                      const ExecutionContext* context) {
+namespace {
+
+Result<ImportedCloud> decode_cloud_of(const Input& input, CloudFormat format, const ImportParams& params,
+                                      const ConfineLimits& limits, const ExecutionContext* context) {
   DecodeRequest request;
   request.format = static_cast<std::uint64_t>(format);
   request.drop_non_finite = params.drop_non_finite ? 1 : 0;
   request.max_samples = params.max_samples;
-  request = with_limits(request, bytes, limits);
-  return decode_in_child(request, bytes, limits, context,
+  request = with_limits(request, input, limits);
+  return decode_in_child(request, input, limits, context,
                          [&](std::span<const std::byte> answer) -> Result<ImportedCloud> {
                            auto decoded = read_answer(answer);
                            if (decoded && decoded.value().report.format != format)
@@ -160,14 +165,29 @@ Result<ImportedCloud> decode_confined(std::span<const std::byte> bytes, CloudFor
                          });
 }
 
+}  // namespace
+
+Result<ImportedCloud> decode_confined(std::span<const std::byte> bytes, CloudFormat format,
+                                      const ImportParams& params, const ConfineLimits& limits,
+                                      const ExecutionContext* context) {
+  return decode_cloud_of(input_of(bytes), format, params, limits, context);
+}
+
+Result<ImportedCloud> decode_confined(int file, std::uint64_t byte_count, CloudFormat format,
+                                      const ImportParams& params, const ConfineLimits& limits,
+                                      const ExecutionContext* context) {
+  return decode_cloud_of({.file = file, .byte_count = byte_count}, format, params, limits, context);
+}
+
 Result<Image> decode_image_confined(std::span<const std::byte> bytes, const ImageLimits& image_limits,
                                     const ConfineLimits& limits, const ExecutionContext* context) {
   DecodeRequest request;
   request.subject = DecodeSubject::kImage;
   request.max_side = image_limits.max_side;
   request.max_pixels = image_limits.max_pixels;
-  request = with_limits(request, bytes, limits);
-  return decode_in_child(request, bytes, limits, context,
+  const Input input = input_of(bytes);
+  request = with_limits(request, input, limits);
+  return decode_in_child(request, input, limits, context,
                          [&](std::span<const std::byte> answer) -> Result<Image> {
                            auto image = read_image_answer(answer);
                            if (image && !fits(image.value(), image_limits))

@@ -42,6 +42,12 @@ Result<ImportedCloud> decode_confined(std::span<const std::byte> bytes, CloudFor
                                       const ImportParams& params, const ConfineLimits& limits,
                                       const ExecutionContext* context = nullptr);
 
+/// The same for an open file of that many bytes, which the decoder reads by its descriptor: nothing is
+/// copied. The file must not change meanwhile.
+Result<ImportedCloud> decode_confined(int file, std::uint64_t byte_count, CloudFormat format,
+                                      const ImportParams& params, const ConfineLimits& limits,
+                                      const ExecutionContext* context = nullptr);
+
 /// read_png() (png_reader.h) in a confined process, within the same limits and with the same further errors.
 Result<Image> decode_image_confined(std::span<const std::byte> bytes, const ImageLimits& image_limits,
                                     const ConfineLimits& limits, const ExecutionContext* context = nullptr);

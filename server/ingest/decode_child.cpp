@@ -10,6 +10,7 @@
 #include "engine/io/cloud_blob.h"
 #include "engine/io/decoded_cloud.h"
 #include "engine/io/draco_gate.h"
+#include "engine/io/pcd.h"
 #include "server/ingest/confined.h"
 #include "server/ingest/exchange_record.h"
 #include "server/ingest/png_reader.h"
@@ -38,6 +39,13 @@ void write_all(std::span<const std::byte> piece) {
 // What decoding may need beyond the bytes themselves. Scans were measured to take a quarter of it (Draco: 40
 // bytes a sample of 15; text of long numbers: twice its bytes); text of one-digit numbers takes nearly all.
 std::uint64_t memory_for(std::span<const std::byte> bytes, CloudFormat format, const ImportParams& params) {
+  if (format == CloudFormat::kPcd) {
+    // Compressed ones expand to up to 88 times their bytes: the expanded bytes, and the columns from them.
+    const auto header = parse_pcd_header(bytes, params.max_samples);
+    if (!header) return 64 * kMiB;
+    const PcdHeader& h = header.value();
+    return 64 * kMiB + 24 * bytes.size() + h.points * (64 + 3 * h.row_bytes());
+  }
   if (format != CloudFormat::kDraco) return 64 * kMiB + 24 * bytes.size();
   const auto claim = draco_gate(bytes, params.max_samples);
   if (!claim) return 64 * kMiB;
@@ -104,16 +112,15 @@ void answer_image(std::span<const std::byte> bytes, const DecodeRequest& request
 int decode_child_main() {
   DecodeRequest request;
   struct stat info {};
-  const bool is_asked = fstat(kRequestDescriptor, &info) == 0 &&
+  const bool is_asked = fstat(kInputDescriptor, &info) == 0 &&
                         pread(kRequestDescriptor, &request, sizeof(request), 0) == sizeof(request) &&
-                        request.magic == DecodeRequest::kMagic &&
-                        static_cast<std::uint64_t>(info.st_size) == sizeof(request) + request.byte_count;
+                        request.magic == DecodeRequest::kMagic && request.byte_count > 0 &&
+                        static_cast<std::uint64_t>(info.st_size) == request.byte_count;
   if (!is_asked) return kNoRequest;
   const auto length = static_cast<std::size_t>(info.st_size);
-  void* mapped = mmap(nullptr, length, PROT_READ, MAP_PRIVATE, kRequestDescriptor, 0);
+  void* mapped = mmap(nullptr, length, PROT_READ, MAP_PRIVATE, kInputDescriptor, 0);
   if (mapped == MAP_FAILED) return kNoRequest;
-  const std::span<const std::byte> bytes(static_cast<const std::byte*>(mapped) + sizeof(request),
-                                         request.byte_count);
+  const std::span<const std::byte> bytes(static_cast<const std::byte*>(mapped), length);
   const bool is_image = request.subject == DecodeSubject::kImage;
 
   const std::uint64_t base = address_space_bytes();

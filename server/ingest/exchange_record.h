@@ -15,9 +15,10 @@
 namespace pointwright {
 
 /// Descriptors of the decoder; every other is closed.
-inline constexpr int kRequestDescriptor = 3;  ///< memory file: a DecodeRequest, then the file's bytes
+inline constexpr int kRequestDescriptor = 3;  ///< memory file: a DecodeRequest
 inline constexpr int kAnswerDescriptor = 4;   ///< empty memory file: an AnswerKind, then a blob or an error
 inline constexpr int kAliveDescriptor = 5;    ///< a pipe's write end that closes when the decoder is gone
+inline constexpr int kInputDescriptor = 6;    ///< the file to decode, or a memory file with its bytes
 
 /// What a decoder is asked to read.
 enum class DecodeSubject : std::uint64_t { kCloud = 0, kImage = 1 };

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <system_error>
@@ -26,16 +27,6 @@ Error too_large(const std::string& path, std::uint64_t limit, std::uint64_t actu
                .field = "path",
                .limit = static_cast<double>(limit),
                .actual = static_cast<double>(actual)};
-}
-
-bool write_all(int file, std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = write(file, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    bytes = bytes.subspan(static_cast<std::size_t>(written));
-  }
-  return true;
 }
 
 std::string folder_of(const std::string& path) {
@@ -72,14 +63,18 @@ Result<std::vector<std::byte>> read_file(const std::string& path, std::uint64_t 
   return bytes;
 }
 
-Result<void> write_file_atomically(const std::string& path, std::span<const std::byte> bytes) {
+namespace {
+
+/// A new file that fill(descriptor) writes, under the name once it is whole.
+template <typename Fill>
+Result<void> make_atomically(const std::string& path, Fill fill) {
   const Descriptor folder(open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!folder.is_open()) return file_error("cannot open the folder of", path, errno);
   const std::string temporary = temporary_name(path);
   {
     Descriptor file(open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
     if (!file.is_open()) return file_error("cannot create", temporary, errno);
-    const bool is_written = write_all(file.get(), bytes) && fsync(file.get()) == 0;
+    const bool is_written = fill(file.get()) && fsync(file.get()) == 0;
     if (!is_written || rename(temporary.c_str(), path.c_str()) != 0) {
       const int number = errno;
       unlink(temporary.c_str());
@@ -88,6 +83,47 @@ Result<void> write_file_atomically(const std::string& path, std::span<const std:
   }
   if (fsync(folder.get()) != 0) return file_error("cannot sync the folder of", path, errno);
   return {};
+}
+
+}  // namespace
+
+Result<void> write_file_atomically(const std::string& path, std::span<const std::byte> bytes) {
+  return make_atomically(path, [&](int file) { return write_all(file, bytes); });
+}
+
+Result<void> copy_file_atomically(const std::string& path, int file, std::uint64_t size) {
+  return make_atomically(path, [&](int copy) {
+    return read_pieces(file, size,
+                       [copy](std::span<const std::byte> piece) { return write_all(copy, piece); });
+  });
+}
+
+bool read_pieces(int file, std::uint64_t size, const std::function<bool(std::span<const std::byte>)>& take) {
+  constexpr std::uint64_t kPieceBytes = std::uint64_t{1} << 20U;
+  std::vector<std::byte> piece(static_cast<std::size_t>(std::min(size, kPieceBytes)));
+  for (std::uint64_t at = 0; at < size;) {
+    const auto want = static_cast<std::size_t>(std::min<std::uint64_t>(size - at, piece.size()));
+    const ssize_t got = pread(file, piece.data(), want, static_cast<off_t>(at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0 || !take(std::span(piece).first(static_cast<std::size_t>(got)))) return false;
+    at += static_cast<std::uint64_t>(got);
+  }
+  return true;
+}
+
+bool write_all(int file, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = write(file, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+bool sync_folder(const std::string& path) {
+  const Descriptor folder(open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  return folder.is_open() && fsync(folder.get()) == 0;
 }
 
 }  // namespace pointwright

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <string>
@@ -22,5 +23,17 @@ Result<std::vector<std::byte>> read_file(const std::string& path,
 /// owner alone.
 /// Errors: kTooLarge (no space or quota; field "path"), kInvalidArgument (anything else; field "path")
 Result<void> write_file_atomically(const std::string& path, std::span<const std::byte> bytes);
+/// The same with the first `size` bytes of an open file, piece by piece.
+Result<void> copy_file_atomically(const std::string& path, int file, std::uint64_t size);
+
+/// Calls take(piece) for every piece of an open file's first `size` bytes, in order, wherever its offset
+/// stands. False: it cannot be read or is shorter, or take() says so.
+bool read_pieces(int file, std::uint64_t size, const std::function<bool(std::span<const std::byte>)>& take);
+
+/// Writes all of it where the open file's offset stands. False: errno says why.
+bool write_all(int file, std::span<const std::byte> bytes);
+
+/// Brings the names in a folder to the disk. False: the disk does not say so.
+bool sync_folder(const std::string& path);
 
 }  // namespace pointwright

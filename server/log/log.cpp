@@ -1,7 +1,8 @@
 #include "server/log/log.h"
 
 #include <spdlog/async.h>
-#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/details/file_helper.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -10,6 +11,7 @@
 #include <thread>
 
 #include "protocol/json/documents.h"
+#include "server/base/request_scope.h"
 
 namespace pointwright::server {
 namespace {
@@ -30,9 +32,31 @@ spdlog::level::level_enum spdlog_level(LogLevel level) {
   return spdlog::level::info;
 }
 
+/// A file that can be opened again under its name.
+class FileSink final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  explicit FileSink(const std::string& path) { file_.open(path); }
+  void reopen() {
+    const std::lock_guard lock(mutex_);
+    file_.reopen(false);
+  }
+
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    file_.write(line);
+  }
+  void flush_() override { file_.flush(); }
+
+ private:
+  spdlog::details::file_helper file_;
+};
+
 }  // namespace
 
 struct Log::Sink {
+  std::shared_ptr<FileSink> file;  // null: standard error
   std::shared_ptr<spdlog::details::thread_pool> threads;
   std::shared_ptr<spdlog::async_logger> logger;
 };
@@ -43,7 +67,8 @@ Log::Log(const std::string& level, const std::string& file) : sink_(std::make_un
     if (file.empty()) {
       target = std::make_shared<spdlog::sinks::stderr_sink_mt>();
     } else {
-      target = std::make_shared<spdlog::sinks::basic_file_sink_mt>(file);
+      sink_->file = std::make_shared<FileSink>(file);
+      target = sink_->file;
     }
   } catch (const spdlog::spdlog_ex& error) {
     throw std::runtime_error(std::string("cannot open the log: ") + error.what());
@@ -68,8 +93,19 @@ void Log::write(LogLevel level, const std::string& event, protocol::JsonDocument
   protocol::JsonDocument line{{"time", protocol::to_rfc3339(std::chrono::system_clock::now())},
                               {"level", std::string(level_name.data(), level_name.size())},
                               {"event", event}};
+  if (const std::string& id = current_request_id(); !id.empty()) line["request_id"] = id;
   for (auto& [name, value] : members.items()) line[name] = std::move(value);
   sink_->logger->log(spdlog_level(level), protocol::to_text(line));
+}
+
+std::optional<std::string> Log::reopen() {
+  if (sink_->file == nullptr) return std::nullopt;
+  try {
+    sink_->file->reopen();
+  } catch (const spdlog::spdlog_ex& error) {
+    return error.what();
+  }
+  return std::nullopt;
 }
 
 void Log::flush() {
@@ -86,7 +122,9 @@ void Log::request(const RequestLog& request) {
                                  {"route", request.route},
                                  {"status", request.status},
                                  {"duration_ms", std::round(request.duration_ms * 1000.0) / 1000.0},
-                                 {"request_bytes", request.request_bytes}};
+                                 {"request_bytes", request.request_bytes},
+                                 {"response_bytes", request.response_bytes}};
+  if (!request.token.empty()) members["token"] = request.token;
   if (!request.failure.empty()) members["failure"] = request.failure;
   const bool failed = request.status >= 500 && request.status != 503 && request.status != 507;
   write(failed || !request.failure.empty() ? LogLevel::kError : LogLevel::kInfo, "request",

@@ -2,6 +2,7 @@
 // The log: one JSON object a line. Never point data, never anything unescaped.
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "protocol/json/requests.h"
@@ -25,6 +26,8 @@ class Log {
   void write(LogLevel level, const std::string& event,
              protocol::JsonDocument members = protocol::JsonDocument::object());
   void request(const RequestLog& request);
+  /// Opens the file of that name again: what was there may have been moved away. A sentence where that fails.
+  std::optional<std::string> reopen();
   /// Waits a moment for what was written to reach the file.
   void flush();
 

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "engine/multires/hierarchy.h"
+#include "server/base/sha256.h"
 #include "server/handlers/service.h"
 #include "server/http/http_server.h"
 #include "server/ingest/files.h"
@@ -26,6 +27,7 @@ HttpOptions http_options(const Config& config) {
   return {.host = config.host,
           .port = config.port,
           .allowed_hosts = config.allowed_hosts,
+          .cors_origins = config.cors_origins,
           .head = {.max_bytes = static_cast<std::size_t>(limits.max_head_bytes),
                    .max_headers = static_cast<std::size_t>(limits.max_headers),
                    .max_path_bytes = static_cast<std::size_t>(limits.max_path_bytes)},
@@ -62,9 +64,11 @@ std::optional<std::string> load_samples(Service& service, Log& log) {
   for (const SampleFile& sample : service.config.samples) {
     const auto bytes = read_file(sample.path, service.config.limits.max_upload_bytes);
     if (!bytes) return bytes.error().message;
-    const auto cloud =
-        import_cloud(service.clouds, service.decode, service.background, service.config.limits, bytes.value(),
-                     {.name = sample.name, .media_type = "", .drop_non_finite = false});
+    const SharedCloud kept = service.clouds.find(sha256_hex(bytes.value()), sample.name);
+    if (kept != nullptr && kept->owner == kEveryone) continue;  // from before
+    const auto cloud = import_cloud(
+        service.clouds, service.decode, service.background, service.config.limits, bytes.value(),
+        {.name = sample.name, .media_type = "", .drop_non_finite = false, .owner = std::string(kEveryone)});
     if (!cloud.ok()) return sample.path + ": " + cloud.problem().detail;
     log.write(LogLevel::kInfo, "sample-loaded",
               {{"cloud", cloud.value()->document.id},
@@ -81,14 +85,58 @@ std::optional<std::string> write_port_file(const std::string& path, std::uint16_
   return written ? std::nullopt : std::optional<std::string>(written.error().message);
 }
 
+/// Reads the tokens again and opens the log again, as often as that is asked for (SIGHUP; SIGUSR1: the log
+/// alone), until the daemon is to end. Returns the signal that said so.
+int wait_for_end(const sigset_t& signals, Service& service, Log& log) {
+  while (true) {
+    int signal = 0;
+    if (::sigwait(&signals, &signal) != 0) continue;
+    if (signal != SIGHUP && signal != SIGUSR1) return signal;
+    if (auto problem = log.reopen()) log.write(LogLevel::kError, "reopen-failed", {{"message", *problem}});
+    if (signal == SIGUSR1) continue;
+    if (auto problem = service.access.tokens.reload()) {
+      log.write(LogLevel::kError, "reload-failed", {{"message", *problem}});
+    } else {
+      log.write(LogLevel::kInfo, "reloaded", {{"tokens", service.access.tokens.list().size()}});
+    }
+  }
+}
+
+/// The decoder, with a line in the log for each child that ran.
+template <typename Decode>
+auto logged(Decode decode, Log& log, const char* what) {
+  return [decode = std::move(decode), &log, what](std::span<const std::byte> bytes, auto&&... rest) {
+    const auto begin = std::chrono::steady_clock::now();
+    auto decoded = decode(bytes, rest...);
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
+    protocol::JsonDocument members{{"what", what}, {"bytes", bytes.size()}, {"duration_ms", took.count()}};
+    if (!decoded) members["refused"] = decoded.error().message;
+    log.write(LogLevel::kInfo, "decoded", std::move(members));
+    return decoded;
+  };
+}
+
+/// Brings back what is kept, loads the samples, and tells the port. A sentence where that fails.
+std::optional<std::string> make_ready(Service& service, const Config& config, std::uint16_t port, Log& log) {
+  try {
+    for (const std::string& note : service.recover())
+      log.write(LogLevel::kError, "damaged", {{"message", note}});
+    if (auto problem = load_samples(service, log)) return problem;
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return write_port_file(config.port_file, port);
+}
+
 }  // namespace
 
 int run_daemon(const Config& config) {
   return_freed_memory();
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a full disk
   sigset_t signals;
   sigemptyset(&signals);
-  for (const int signal : {SIGTERM, SIGINT, SIGUSR1}) sigaddset(&signals, signal);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1, SIGUSR2}) sigaddset(&signals, signal);
   ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before any thread is made: all inherit it
 
   const auto fail = [](const std::string& message) {
@@ -102,29 +150,38 @@ int run_daemon(const Config& config) {
     raise_descriptor_limit(config, log);
     const auto decoders = std::make_shared<DecodeSlots>(static_cast<int>(config.limits.max_decoders));
     Service service(config,
-                    {.decode = confined_decoder(decoders),
-                     .decode_image = confined_image_decoder(config.limits, decoders),
+                    {.decode = logged(confined_decoder(decoders), log, "cloud"),
+                     .decode_image = logged(confined_image_decoder(config.limits, decoders), log, "image"),
                      .build = build_hierarchy,
                      .resample = apply_resampled_edit,
                      .assets = config.web_root.empty() ? AssetTable() : AssetTable::load(config.web_root),
-                     .report_failure = [&log](const std::string& text) {
-                       log.write(LogLevel::kError, "task-failed", {{"failure", text}});
-                     }});
-    if (auto problem = load_samples(service, log)) return fail(*problem);
+                     .report_failure =
+                         [&log](const std::string& text) {
+                           log.write(LogLevel::kError, "task-failed", {{"failure", text}});
+                         },
+                     .decode_file = confined_file_decoder(decoders),
+                     .routes = route_names()});
     HttpServer server(
         http_options(config),
         [&service](const RequestHead& head, const std::string& id) { return resolve(service, head, id); },
-        [&log](const RequestLog& request) { log.request(request); });
+        [&log, &service](const RequestLog& request) {
+          service.metrics.count_request(request);
+          log.request(request);
+        });
+    service.connections = [&server] { return server.active_connections(); };
     if (auto problem = server.start()) return fail(*problem);
-    // The socket listens already: whoever reads the port can connect, and is served once the thread below
-    // runs.
-    if (auto problem = write_port_file(config.port_file, server.port())) return fail(*problem);
     std::atomic<bool> ended_by_itself{false};
     std::thread listener([&] {
       if (server.run()) return;
       ended_by_itself = true;
-      ::kill(::getpid(), SIGUSR1);  // wakes the wait below
+      ::kill(::getpid(), SIGUSR2);  // wakes the wait below
     });
+    // From here on it says that it is alive; ready it is once it knows what it holds.
+    if (auto problem = make_ready(service, config, server.port(), log)) {
+      (void)server.stop(std::chrono::milliseconds(config.limits.shutdown_deadline_ms));
+      listener.join();
+      return fail(*problem);
+    }
     log.write(LogLevel::kInfo, "started",
               {{"version", POINTWRIGHT_VERSION},
                {"host", config.host},
@@ -134,11 +191,13 @@ int run_daemon(const Config& config) {
     std::cout << "pointwrightd listens on http://" << (is_ipv6 ? "[" + config.host + "]" : config.host) << ":"
               << server.port() << "/" << std::endl;
 
-    int signal = 0;
-    ::sigwait(&signals, &signal);
+    const int signal = wait_for_end(signals, service, log);
     // From here on a further signal ends the process as it always would.
     for (const int each : {SIGTERM, SIGINT}) std::signal(each, SIG_DFL);
-    ::pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+    sigset_t ending;
+    sigemptyset(&ending);
+    for (const int each : {SIGTERM, SIGINT}) sigaddset(&ending, each);
+    ::pthread_sigmask(SIG_UNBLOCK, &ending, nullptr);
     log.write(LogLevel::kInfo, "stopping", {{"signal", signal}, {"requests", server.active_connections()}});
     service.stopping = true;
     const bool drained = server.stop(std::chrono::milliseconds(config.limits.shutdown_deadline_ms));

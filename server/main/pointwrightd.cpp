@@ -7,6 +7,7 @@
 #include "server/config/config.h"
 #include "server/ingest/confined.h"
 #include "server/main/daemon.h"
+#include "server/main/token_command.h"
 
 extern char** environ;
 
@@ -14,6 +15,8 @@ int main(int argc, char** argv) {
   namespace server = pointwright::server;
   if (argc > 1 && std::strcmp(argv[1], pointwright::kDecodeChildArgument) == 0)
     return pointwright::decode_child_main();
+  if (argc > 1 && std::strcmp(argv[1], "token") == 0)
+    return server::run_token_command(std::vector<std::string>(argv + 2, argv + argc), std::cout, std::cerr);
   server::EnvironmentNames names;
   for (char** entry = environ; *entry != nullptr; ++entry) {
     const std::string text = *entry;

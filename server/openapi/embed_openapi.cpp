@@ -1,4 +1,4 @@
-// A build tool: turns openapi.yaml into a C++ source that holds it as YAML and as JSON.
+// A build tool: turns openapi.yaml into a C++ source that holds it as YAML, as JSON and as a page to read.
 
 #include <yaml-cpp/yaml.h>
 
@@ -7,6 +7,8 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+
+#include "server/openapi/render_docs.h"
 
 namespace {
 
@@ -63,13 +65,18 @@ int main(int argc, char** argv) {
   std::ostringstream yaml;
   yaml << std::ifstream(argv[1]).rdbuf();
   try {
-    const std::string json = json_of(YAML::Load(yaml.str())).dump();
+    const Json api = json_of(YAML::Load(yaml.str()));
+    const std::string json = api.dump();
     std::ofstream out(argv[2]);
     out << "// Made from protocol/openapi.yaml by embed_openapi.\n#include \"server/handlers/openapi.h\"\n\n"
         << "namespace pointwright::server {\n\nstd::string_view openapi_yaml() {\n  return "
         << literal(yaml.str())
         << ";\n}\n\nconst std::string& openapi_json() {\n  static const std::string text = " << literal(json)
-        << ";\n  return text;\n}\n\n}  // namespace pointwright::server\n";
+        << ";\n  return text;\n}\n\nstd::string_view docs_file(std::string_view name) {\n"
+        << "  if (name == \"docs.html\") return " << literal(pointwright::docs::render_page(api)) << ";\n"
+        << "  if (name == \"docs.css\") return " << literal(std::string(pointwright::docs::style())) << ";\n"
+        << "  if (name == \"docs.js\") return " << literal(std::string(pointwright::docs::script())) << ";\n"
+        << "  return {};\n}\n\n}  // namespace pointwright::server\n";
     return out.good() ? 0 : 1;
   } catch (const YAML::Exception& error) {
     std::cerr << argv[1] << ": " << error.what() << "\n";

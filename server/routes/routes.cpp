@@ -4,56 +4,84 @@
 #include <array>
 
 #include "server/handlers/handlers.h"
+#include "server/handlers/uploads.h"
 
 namespace pointwright::server {
 namespace {
 
 using enum Method;
+using enum Permission;
 using Body = BodyPolicy::Kind;
+/// An Idempotency-Key makes the request have one effect.
+constexpr bool kOnce = true;
 
 constexpr std::array kRoutes = {
-    Route{kGet, "/", Body::kNone, get_service},
-    Route{kGet, "/healthz", Body::kNone, get_health},
-    Route{kGet, "/readyz", Body::kNone, get_readiness},
-    Route{kGet, "/openapi.yaml", Body::kNone, get_openapi_yaml},
-    Route{kGet, "/openapi.json", Body::kNone, get_openapi_json},
-    Route{kGet, "/problems/{slug}", Body::kNone, get_problem},
+    Route{kGet, "/", Body::kNone, get_service, kOpen},
+    Route{kGet, "/healthz", Body::kNone, get_health, kOpen},
+    Route{kGet, "/readyz", Body::kNone, get_readiness, kOpen},
+    Route{kGet, "/openapi.yaml", Body::kNone, get_openapi_yaml, kOpen},
+    Route{kGet, "/openapi.json", Body::kNone, get_openapi_json, kOpen},
+    Route{kGet, "/problems/{slug}", Body::kNone, get_problem, kOpen},
+    Route{kGet, "/metrics", Body::kNone, get_metrics, kNoGuests},
+    Route{kGet, "/docs", Body::kNone, get_docs, kOpen},
+    Route{kGet, "/docs/docs.css", Body::kNone, get_docs_file, kOpen},
+    Route{kGet, "/docs/docs.js", Body::kNone, get_docs_file, kOpen},
     Route{kGet, "/v1/info", Body::kNone, get_info},
+    Route{kGet, "/v1/tokens", Body::kNone, list_tokens, kAdmin},
+    Route{kPost, "/v1/tokens", Body::kJson, create_token, kAdmin},
+    Route{kDelete, "/v1/tokens/{id}", Body::kNone, revoke_token, kAdmin},
     Route{kGet, "/v1/clouds", Body::kNone, list_clouds},
-    Route{kPost, "/v1/clouds", Body::kCloud, upload_cloud},
+    Route{kPost, "/v1/clouds", Body::kCloud, upload_cloud, kOwner, kOnce},
     Route{kGet, "/v1/clouds/{id}", Body::kNone, get_cloud},
     Route{kDelete, "/v1/clouds/{id}", Body::kNone, delete_cloud},
     Route{kGet, "/v1/clouds/{id}/data", Body::kNone, get_cloud_data},
+    Route{kGet, "/v1/uploads", Body::kNone, list_uploads},
+    Route{kPost, "/v1/uploads", Body::kUpload, create_upload, kOwner},
+    Route{kGet, "/v1/uploads/{id}", Body::kNone, get_upload},
+    Route{kPatch, "/v1/uploads/{id}", Body::kUpload, patch_upload},
+    Route{kDelete, "/v1/uploads/{id}", Body::kNone, delete_upload},
     Route{kGet, "/v1/images", Body::kNone, list_images},
-    Route{kPost, "/v1/images", Body::kImage, upload_image},
+    Route{kPost, "/v1/images", Body::kImage, upload_image, kOwner},
     Route{kGet, "/v1/images/{id}", Body::kNone, get_image},
     Route{kDelete, "/v1/images/{id}", Body::kNone, delete_image},
     Route{kGet, "/v1/images/{id}/data", Body::kNone, get_image_data},
     Route{kGet, "/v1/sessions", Body::kNone, list_sessions},
-    Route{kPost, "/v1/sessions", Body::kJson, create_session},
+    Route{kPost, "/v1/sessions", Body::kJson, create_session, kOwner, kOnce},
     Route{kGet, "/v1/sessions/{id}", Body::kNone, get_session},
-    Route{kDelete, "/v1/sessions/{id}", Body::kNone, delete_session},
+    Route{kPatch, "/v1/sessions/{id}", Body::kJson, patch_session},
+    Route{kDelete, "/v1/sessions/{id}", Body::kNone, delete_session, kOwner},
+    Route{kGet, "/v1/sessions/{id}/shares", Body::kNone, list_shares, kOwner},
+    Route{kPost, "/v1/sessions/{id}/shares", Body::kJson, create_share, kOwner},
+    Route{kDelete, "/v1/sessions/{id}/shares/{id}", Body::kNone, revoke_share, kOwner},
     Route{kGet, "/v1/sessions/{id}/regions/{region}", Body::kNone, get_painting},
     Route{kPut, "/v1/sessions/{id}/regions/{region}", Body::kLargeJson, replace_painting},
     Route{kDelete, "/v1/sessions/{id}/regions/{region}", Body::kNone, clear_painting},
-    Route{kPost, "/v1/sessions/{id}/regions/{region}/operations", Body::kJson, paint_region},
+    Route{kPost, "/v1/sessions/{id}/regions/{region}/operations", Body::kJson, paint_region, kByMethod,
+          kOnce},
     Route{kPut, "/v1/sessions/{id}/preview", Body::kJson, put_preview},
     Route{kPost, "/v1/sessions/{id}/preview", Body::kJson, post_preview},
     Route{kDelete, "/v1/sessions/{id}/preview", Body::kNone, delete_preview},
     Route{kGet, "/v1/sessions/{id}/edits", Body::kNone, list_edits},
-    Route{kPost, "/v1/sessions/{id}/edits", Body::kJson, post_edit},
+    Route{kPost, "/v1/sessions/{id}/edits", Body::kJson, post_edit, kByMethod, kOnce},
+    Route{kGet, "/v1/sessions/{id}/edits/{edit}", Body::kNone, get_edit},
+    Route{kPut, "/v1/sessions/{id}/edits/{edit}", Body::kJson, put_edit},
+    Route{kDelete, "/v1/sessions/{id}/edits/{edit}", Body::kNone, delete_edit},
     Route{kPut, "/v1/sessions/{id}/head", Body::kJson, put_head},
     Route{kGet, "/v1/sessions/{id}/recipe", Body::kNone, get_recipe},
-    Route{kPost, "/v1/sessions/{id}/recipe", Body::kLargeJson, post_recipe},
+    Route{kPost, "/v1/sessions/{id}/recipe", Body::kLargeJson, post_recipe, kByMethod, kOnce},
     Route{kGet, "/v1/sessions/{id}/samples", Body::kNone, get_samples},
     Route{kGet, "/v1/sessions/{id}/stream", Body::kNone, get_stream},
+    Route{kGet, "/v1/sessions/{id}/events", Body::kNone, get_events},
 };
 /// The viewer's files answer for every other path that is in their table.
-constexpr Route kAssetRoute{kGet, "/{asset}", Body::kNone, get_asset};
+constexpr Route kAssetRoute{kGet, "/{asset}", Body::kNone, get_asset, kOpen};
 
 bool fits(std::string_view placeholder, std::string_view text) {
   if (placeholder == "{id}") return protocol::is_valid_id(text);
   if (placeholder == "{region}") return protocol::region_of_name(text).has_value();
+  if (placeholder == "{edit}")
+    return !text.empty() && text.size() <= 9 &&
+           text.find_first_not_of("0123456789") == std::string_view::npos;
   if (placeholder == "{slug}")
     return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
       return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
@@ -70,7 +98,10 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
     case Body::kLargeJson:
       return {.kind = route.body, .max_bytes = limits.max_recipe_bytes};
     case Body::kCloud:
-      return {.kind = route.body, .max_bytes = limits.max_upload_bytes};
+      return {
+          .kind = route.body, .max_bytes = limits.max_upload_bytes, .max_json_bytes = limits.max_json_bytes};
+    case Body::kUpload:
+      return {.kind = route.body, .max_bytes = limits.max_upload_file_bytes};
     case Body::kImage:
       return {.kind = route.body, .max_bytes = limits.max_image_file_bytes};
   }
@@ -80,7 +111,8 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
 /// Where the bytes of a body are held from as they arrive. Documents have a reserve of their own, so that no
 /// upload keeps a hand waiting. A body for which there is no room now is refused before it is read; one over
 /// its limit is let through: the fence refuses it.
-Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const RequestHead& head) {
+Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const RequestHead& head,
+                            const Caller& caller) {
   const bool is_upload = policy.kind == Body::kCloud || policy.kind == Body::kImage;
   Budget& memory = is_upload ? service.upload_memory : service.json_memory;
   const std::uint64_t length = head.content_length.value_or(0);
@@ -95,21 +127,110 @@ Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const Re
                    .detail = "other requests take the memory for bodies",
                    .limit = static_cast<double>(memory.total()),
                    .actual = static_cast<double>(held + length)};
+  if (is_upload)
+    if (auto charged = service.access.charge_upload(caller, length); !charged.ok()) return charged.problem();
   return &memory;
+}
+
+/// Why the caller may not use the row at all.
+std::optional<Problem> check_permission(const Route& route, const Caller& caller) {
+  Scope needed = changes_state(route.method) ? Scope::kEdit : Scope::kView;
+  if (route.permission == kOwner) needed = Scope::kEdit;
+  if (route.permission == kAdmin) needed = Scope::kAdmin;
+  const bool no_guests =
+      route.permission == kNoGuests || route.permission == kOwner || route.permission == kAdmin;
+  if (caller.session && no_guests)
+    return Problem{.kind = ProblemKind::kForbidden, .detail = "a share link does not permit this"};
+  if (!caller.may(needed))
+    return Problem{.kind = ProblemKind::kForbidden,
+                   .detail = std::string("this takes a token with the scope ")
+                                 .append(protocol::scope_name(needed))
+                                 .append("; this one has ")
+                                 .append(protocol::scope_name(caller.scope))};
+  return std::nullopt;
+}
+
+/// Why the caller gets nothing of what the path names: it is not there, or not for this caller. Both read the
+/// same, on every route and before any byte of a body is read.
+std::optional<Problem> check_sight(Service& service, const Route& route,
+                                   const std::vector<std::string>& captures, const Caller& caller) {
+  const auto is_below = [&](std::string_view prefix) {
+    return route.pattern.substr(0, prefix.size()) == prefix;
+  };
+  const auto missing = [](const char* detail) {
+    return Problem{.kind = ProblemKind::kNotFound, .detail = detail};
+  };
+  std::string owner;
+  if (is_below("/v1/sessions/{id}")) {
+    auto found = service.sessions.owner_of(captures.front());  // wakes nobody
+    if (!found || !caller.may_see_session(*found, captures.front()))
+      return missing("there is no such session");
+    owner = std::move(*found);
+  } else if (is_below("/v1/clouds/{id}")) {
+    const SharedCloud cloud = service.clouds.find(captures.front());
+    if (cloud == nullptr || !caller.may_see(cloud->owner)) return missing("there is no such cloud");
+    owner = cloud->owner;
+  } else if (is_below("/v1/images/{id}")) {
+    const SharedImage image = service.images.find(captures.front());
+    if (image == nullptr || !caller.may_see(image->owner)) return missing("there is no such image");
+    owner = image->owner;
+  } else if (is_below("/v1/uploads/{id}")) {
+    const auto upload = service.uploads.find(captures.front());
+    if (!upload || !caller.may_see(upload->record.owner)) return missing("there is no such upload");
+    owner = upload->record.owner;
+  } else {
+    return std::nullopt;
+  }
+  if (changes_state(route.method) && !caller.may_change(owner))
+    return Problem{.kind = ProblemKind::kForbidden,
+                   .detail = "this belongs to all; only an admin changes it"};
+  return std::nullopt;
+}
+
+/// Who asks, after everything that speaks against answering. A session that the caller may not see does not
+/// exist for it, so that is said before what the scope forbids.
+Outcome<Caller> admit_caller(Service& service, const Route& route, const RequestHead& head,
+                             const std::vector<std::string>& captures) {
+  if (route.permission == kOpen) return Caller{.scope = Scope::kView};
+  auto caller = service.access.identify(head);
+  if (!caller.ok()) return caller;
+  if (auto charged = service.access.charge_request(caller.value()); !charged.ok()) return charged.problem();
+  if (auto problem = check_sight(service, route, captures, caller.value())) return std::move(*problem);
+  if (auto problem = check_permission(route, caller.value())) return std::move(*problem);
+  return caller;
 }
 
 Resolution endpoint_of(Service& service, const Route& route, std::vector<std::string> captures,
                        const RequestHead& head, const std::string& request_id) {
+  // Before anything is looked for: what is not known yet must not read as missing.
+  const bool tells_state = route.handler == get_health || route.handler == get_readiness;
+  if (!service.is_ready && !tells_state)
+    return problem_response({.kind = ProblemKind::kOverloaded, .detail = "the server is starting"}, head.path,
+                            request_id);
+  auto caller = admit_caller(service, route, head, captures);
+  if (!caller.ok()) return problem_response(caller.problem(), head.path, request_id);
+  if (is_upload_path(head.path))
+    if (const auto problem = check_tus(head))
+      return with_tus_headers(service, problem_response(*problem, head.path, request_id), true);
   Endpoint endpoint{
       .body = policy_of(route, service.config.limits),
       .route = std::string(route.pattern),
       .captures = std::move(captures),
       .handle = [&service, handler = route.handler](const Request& r) { return handler(service, r); }};
-  if (route.body != Body::kNone) {
-    auto admitted = admit_body(service, endpoint.body, head);
+  if (route.once)
+    endpoint.handle = [&service, handler = route.handler](const Request& r) {
+      return answer_once(service, r, handler);
+    };
+  if (route.body == Body::kUpload) {
+    // These bodies go to the disk: they need no memory.
+    const auto open = route.method == kPost ? open_new_upload : open_upload;
+    endpoint.open_target = [&service, open](const Request& r) { return open(service, r); };
+  } else if (route.body != Body::kNone) {
+    auto admitted = admit_body(service, endpoint.body, head, caller.value());
     if (!admitted.ok()) return problem_response(admitted.problem(), head.path, request_id);
     endpoint.body_memory = admitted.value();
   }
+  endpoint.caller = std::move(caller.value());
   return endpoint;
 }
 
@@ -117,6 +238,16 @@ Resolution endpoint_of(Service& service, const Route& route, std::vector<std::st
 
 std::span<const Route> all_routes() {
   return kRoutes;
+}
+
+std::vector<std::string> route_names() {
+  std::vector<std::string> names;
+  const auto add = [&](const Route& route) {
+    names.push_back(std::string(method_name(route.method)).append(" ").append(route.pattern));
+  };
+  for (const Route& route : kRoutes) add(route);
+  add(kAssetRoute);
+  return names;
 }
 
 bool matches(std::string_view pattern, std::string_view path, std::vector<std::string>& captures) {
@@ -156,7 +287,11 @@ Resolution resolve(Service& service, const RequestHead& head, const std::string&
   if (allowed.empty())
     return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is nothing under this path"},
                             head.path, request_id);
-  if (head.method == kOptions) return Response{.status = 204}.with_header("Allow", allowed + ", OPTIONS");
+  if (head.method == kOptions) {
+    Response response{.status = 204};
+    response.with_header("Allow", allowed + ", OPTIONS");
+    return is_upload_path(head.path) ? with_tus_headers(service, std::move(response), true) : response;
+  }
   return problem_response(
              {.kind = ProblemKind::kMethodNotAllowed, .detail = "this resource takes " + allowed}, head.path,
              request_id)

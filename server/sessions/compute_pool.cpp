@@ -14,7 +14,7 @@ ComputePool::ComputePool(std::size_t threads, int task_threads,
 }
 
 ComputePool::~ComputePool() {
-  std::deque<std::function<void()>> dropped;
+  std::deque<RequestTask> dropped;
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
@@ -28,14 +28,14 @@ void ComputePool::post(std::function<void()> task) {
   {
     const std::lock_guard lock(mutex_);
     if (stopping_) return;  // the task is dropped, and with it its promise
-    tasks_.push_back(std::move(task));
+    tasks_.emplace_back(std::move(task));
   }
   wake_.notify_one();
 }
 
 void ComputePool::run() {
   while (true) {
-    std::function<void()> task;
+    RequestTask task;
     {
       std::unique_lock lock(mutex_);
       wake_.wait(lock, [this] { return stopping_ || !tasks_.empty(); });
@@ -43,7 +43,8 @@ void ComputePool::run() {
       task = std::move(tasks_.front());
       tasks_.pop_front();
     }
-    guarded([&] { with_threads(task_threads_, task); });
+    const RequestScope scope(task.request);
+    guarded([&] { with_threads(task_threads_, task.run); });
   }
 }
 
@@ -60,7 +61,7 @@ void ComputePool::guarded(const std::function<void()>& task) const {
 void Strand::post(std::function<void()> task) {
   {
     const std::lock_guard lock(state_->mutex);
-    state_->tasks.push_back(std::move(task));
+    state_->tasks.emplace_back(std::move(task));
     if (state_->running) return;
     state_->running = true;
   }
@@ -73,7 +74,7 @@ void Strand::queue_up(const std::shared_ptr<State>& state) {
 
 Strand::Turn::~Turn() {
   if (state == nullptr) return;
-  std::deque<std::function<void()>> dropped;  // let go without the lock: whatever they hold
+  std::deque<RequestTask> dropped;  // let go without the lock: whatever they hold
   const std::lock_guard lock(state->mutex);
   dropped.swap(state->tasks);
   state->running = false;
@@ -85,14 +86,17 @@ bool Strand::is_idle_behind() const {
 }
 
 void Strand::run_one(const std::shared_ptr<State>& state) {
-  std::function<void()> task;
+  RequestTask task;
   {
     const std::lock_guard lock(state->mutex);
     task = std::move(state->tasks.front());
     state->tasks.pop_front();
   }
-  state->pool.guarded(task);
-  task = nullptr;  // what it holds is let go before the next one starts
+  {
+    const RequestScope scope(task.request);
+    state->pool.guarded(task.run);
+  }
+  task.run = nullptr;  // what it holds is let go before the next one starts
   {
     const std::lock_guard lock(state->mutex);
     if (state->tasks.empty()) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "server/base/outcome.h"
+#include "server/base/request_scope.h"
 
 namespace pointwright::server {
 
@@ -35,6 +36,12 @@ class ComputePool {
   /// Runs the task here and now, as post() would later.
   void guarded(const std::function<void()>& task) const;
 
+  /// Tasks that wait for a thread.
+  [[nodiscard]] std::size_t waiting() const {
+    const std::lock_guard lock(mutex_);
+    return tasks_.size();
+  }
+
   /// Runs `work` and hands its result, or its exception, to the future.
   template <typename Work>
   std::future<std::invoke_result_t<Work>> submit(Work work) {
@@ -49,9 +56,9 @@ class ComputePool {
 
   int task_threads_;
   std::function<void(const std::string&)> report_failure_;
-  std::mutex mutex_;  // guards tasks_ and stopping_
+  mutable std::mutex mutex_;  // guards tasks_ and stopping_
   std::condition_variable wake_;
-  std::deque<std::function<void()>> tasks_;
+  std::deque<RequestTask> tasks_;
   bool stopping_ = false;
   std::vector<std::thread> threads_;
 };
@@ -89,7 +96,7 @@ class Strand {
     explicit State(ComputePool& owner) : pool(owner) {}
     ComputePool& pool;
     mutable std::mutex mutex;  // guards tasks and running
-    std::deque<std::function<void()>> tasks;
+    std::deque<RequestTask> tasks;
     bool running = false;
   };
   /// The place of a strand in the pool's queue. Where it is dropped there, so are the strand's tasks: one

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "engine/editing/painting.h"
@@ -26,7 +27,8 @@ struct Painting {
 struct Document {
   protocol::SessionState state = protocol::SessionState::kBuilding;
   std::optional<protocol::Problem> error = std::nullopt;  ///< kFailed: why
-  std::uint64_t revision = 0;  ///< grows with each region change, edit and head move
+  std::string name = {};                                  ///< of the session
+  std::uint64_t revision = 0;  ///< grows with each change of a region, the name, the edits and the head
   SurfaceState surface = {};   ///< the committed one; null while building
   std::shared_ptr<const Marks> marks = {};
   Painting zero = {};

@@ -213,9 +213,13 @@ void History::keep_whole(std::size_t node, const SurfaceState& state, bool deriv
   kept.whole->first_valid_level = kept.first_valid_level;
 }
 
-void History::push(std::shared_ptr<const RecordedEdit> edit, SurfaceState after) {
+void History::forget_undone() {
   edits_.resize(head_);
   nodes_.resize(head_ + 1);
+}
+
+void History::push(std::shared_ptr<const RecordedEdit> edit, SurfaceState after) {
+  forget_undone();
   Node node{.step = step_between(current_, after)};
   // Where samples are gone the state before is the way back.
   if (!node.step) keep_whole(head_, current_, derived_);

@@ -45,6 +45,8 @@ class History {
   /// with the stale levels that replaying gives.
   /// Pre: `after` was made of current()
   void push(std::shared_ptr<const RecordedEdit> edit, SurfaceState after);
+  /// Forgets the edits after the head.
+  void forget_undone();
   /// Puts an equal state with all levels valid in place of the current one.
   void replace_current(SurfaceState derived);
   /// Goes to the state after `edit` edits on the cheapest way: over steps where they are kept, by replay from

@@ -127,21 +127,13 @@ class Application {
   }
   std::optional<Problem> record(std::size_t index, const EditParams& params) {
     History& history = fork_.history;
-    if (auto valid = validate(params, *history.current().surface); !valid)
-      return problem_of_edit(valid.error(), index);
-    if (params.level < history.current().first_valid_level) {
-      auto derived = with_valid_level(session_.rest(), history.current(), params.level, session_.context());
-      if (!derived) return problem_of_edit(derived.error(), index);
-      history.replace_current(std::move(derived).value());
-    }
     // Parts of edits may have inserted other samples than the whole ones that paintings are made on.
     const SharedSamples samples = history.current().samples;
     const SharedMarks marks =
         carried_marks(*whole_.samples, marks_, *samples, nullptr, whole_is_recorded_ ? kAllIds : shared_ids_);
-    auto after = played(session_, history.current(), params, marks);
-    if (!after) return problem_of_edit(after.error(), index);
-    auto edit = record_of(history.head() + 1, params, marks, history.current(), after.value());
-    history.push(std::move(edit), std::move(after).value());
+    const auto now = std::chrono::system_clock::now();
+    if (auto made = server::record(session_, history, params, marks, now); !made)
+      return problem_of_edit(made.error(), index);
     recorded_marks_ = carried_marks(*samples, marks, *history.current().samples);
     return std::nullopt;
   }
@@ -160,7 +152,7 @@ class Application {
 }  // namespace
 
 Outcome<SharedDocument> apply_recipe(Session& session, const protocol::RecipeRequest& request,
-                                     Session::Expected expected) {
+                                     Session::Expected expected, const Seal<SharedDocument>& seal) {
   auto forked = session.fork(expected);
   if (!forked.ok()) return forked.problem();
   const SharedDocument before = forked.value().document;
@@ -177,7 +169,7 @@ Outcome<SharedDocument> apply_recipe(Session& session, const protocol::RecipeReq
     const double part = !in_sequence ? request.s : i < place.whole ? 1.0 : place.part;
     if (auto problem = application.add(i, edits[i], part, i + 1 < count)) return *problem;
   }
-  return session.adopt(application.finish());
+  return session.adopt(application.finish(), seal);
 }
 
 }  // namespace pointwright::server

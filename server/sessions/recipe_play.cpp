@@ -78,6 +78,21 @@ Result<SurfaceState> played(const Session& session, const SurfaceState& before, 
   return after;
 }
 
+Result<void> record(const Session& session, History& history, const EditParams& params,
+                    const SharedMarks& marks, std::chrono::system_clock::time_point created) {
+  if (auto valid = validate(params, *history.current().surface); !valid) return valid.error();
+  if (params.level < history.current().first_valid_level) {
+    auto derived = with_valid_level(session.rest(), history.current(), params.level, session.context());
+    if (!derived) return derived.error();
+    history.replace_current(std::move(derived).value());
+  }
+  auto after = played(session, history.current(), params, marks);
+  if (!after) return after.error();
+  auto edit = record_of(history.head() + 1, params, marks, history.current(), after.value(), created);
+  history.push(std::move(edit), std::move(after).value());
+  return {};
+}
+
 Outcome<SurfaceState> KnownStates::after(std::size_t edit) {
   if (here_.state.surface == nullptr || here_.edit != edit) {
     auto known = session_.known_state(edits_, edit);

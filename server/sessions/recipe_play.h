@@ -22,6 +22,11 @@ SequencePlace place_in_sequence(double s, std::size_t edits);
 Result<SurfaceState> played(const Session& session, const SurfaceState& before, const EditParams& edit,
                             const std::shared_ptr<const Marks>& marks);
 
+/// Makes an edit on the head of a history and records it; a level that it needs is derived first.
+/// Errors: those of played()
+Result<void> record(const Session& session, History& history, const EditParams& params,
+                    const SharedMarks& marks, std::chrono::system_clock::time_point created);
+
 /// A walk along recorded edits that takes what the session's history knows and replays the rest.
 class KnownStates {
  public:

@@ -40,7 +40,7 @@ Outcome<RecipeText> export_recipe(Session& session, std::uint64_t max_bytes);
 ///           not the session's, limits, and what edits and paintings are refused for, with pointers into the
 ///           document
 Outcome<SharedDocument> apply_recipe(Session& session, const protocol::RecipeRequest& request,
-                                     Session::Expected expected);
+                                     Session::Expected expected, const Seal<SharedDocument>& seal = {});
 
 /// The committed surface with its applied edits played part of the way; nothing is recorded. At s = 1 it is
 /// the committed one, at s = 0 the rest, to the bit.

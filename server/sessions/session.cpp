@@ -23,6 +23,13 @@ protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) 
   return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
 }
 
+Document starting_document(const SessionParams& params, const protocol::ModelBounds& bounds) {
+  Document document = params.kept != nullptr ? *params.kept : Document{};
+  document.name = params.name;
+  document.bounds = bounds;
+  return document;
+}
+
 float detail_range_of(const SurfaceState& state) {
   float range = 0.0F;
   for (const DecompositionReport& report : *state.reports) range = std::max(range, report.max_detail);
@@ -35,8 +42,9 @@ Session::Session(SessionParams params, SessionServices services)
     : params_(std::move(params)),
       services_(std::move(services)),
       strand_(services_.interactive),
+      presence_(std::make_shared<Presence>([feed = feed_] { feed->notify(); })),
       document_(std::make_shared<const Document>(
-          Document{.bounds = model_bounds(params_.cloud->position, params_.cloud->origin)})) {
+          starting_document(params_, model_bounds(params_.cloud->position, params_.cloud->origin)))) {
   rest_ = RestModel{.params = params_.hierarchy,
                     .origin = params_.cloud->origin,
                     .diagonal = bounds_of(params_.cloud->position).diagonal(),
@@ -45,9 +53,17 @@ Session::Session(SessionParams params, SessionServices services)
                     .room = params_.room};
 }
 
+std::shared_ptr<Session> Session::make(SessionParams params, SessionServices services) {
+  return std::shared_ptr<Session>(new Session(std::move(params), std::move(services)));
+}
+
+void Session::start() {
+  services_.background.post([self = shared_from_this()] { self->build(); });
+}
+
 std::shared_ptr<Session> Session::create(SessionParams params, SessionServices services) {
-  std::shared_ptr<Session> session(new Session(std::move(params), std::move(services)));
-  session->services_.background.post([session] { session->build(); });
+  auto session = make(std::move(params), std::move(services));
+  session->start();
   return session;
 }
 
@@ -65,7 +81,7 @@ void Session::build() {
     throw;
   }
   note_time("build", begin);
-  strand_.post([self = shared_from_this(), built] { self->finish_building(std::move(*built)); });
+  finish_building(std::move(*built));
 }
 
 void Session::fail(Problem problem) {
@@ -90,6 +106,7 @@ void Session::finish_building(Result<Hierarchy> built) {
       .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),
       .first_valid_level = 0,
       .samples = samples};
+  // Nothing runs on the strand that looks at the history before the session is ready.
   history_.emplace(
       state, params_.history_bytes,
       History::Work{
@@ -97,24 +114,30 @@ void Session::finish_building(Result<Hierarchy> built) {
                            const RecordedEdit& record) { return replayed(rest_, before, record, context_); },
           .derive =
               [this](const SurfaceState& stale) { return with_valid_level(rest_, stale, 0, context_); }});
-  document.state = protocol::SessionState::kReady;
   document.surface = std::move(state);
-  document.marks = std::make_shared<const Marks>(params_.cloud->size(), std::uint8_t{0});
-  const auto no_operations = std::make_shared<const OperationList>();
-  document.zero.operations = document.one.operations = no_operations;
-  document.edits = std::make_shared<const EditList>();
+  if (params_.kept != nullptr) {
+    if (auto problem = bring_back(document)) return fail(std::move(*problem));
+  } else {
+    document.marks = std::make_shared<Marks>(params_.cloud->size(), std::uint8_t{0});
+    document.zero.operations = document.one.operations = std::make_shared<const OperationList>();
+    document.edits = std::make_shared<const EditList>();
+  }
+  document.state = protocol::SessionState::kReady;
   context_.begin_phase("ready", 1.0);
-  // The picture first: whoever sees that the session is ready gets a frame of it.
-  display_.publish(picture_of(document, document.surface, {}, 0));
-  publish(std::move(document));
+  strand_.post([self = shared_from_this(), ready = std::make_shared<const Document>(std::move(document))] {
+    // The picture first: whoever sees that the session is ready gets a frame of it.
+    self->display_.publish(picture_of(*ready, ready->surface, {}, 0));
+    self->publish(ready);
+    if (ready->revision > 0) self->schedule_field();
+  });
 }
 
-void Session::publish(Document document) {
+void Session::publish(SharedDocument document) {
   {
     const std::lock_guard lock(document_mutex_);
-    document_ = std::make_shared<const Document>(std::move(document));
+    document_ = std::move(document);
   }
-  feed_.notify();
+  feed_->notify();
 }
 
 SharedDocument Session::document() const {
@@ -124,6 +147,7 @@ SharedDocument Session::document() const {
 
 void Session::note_time(const std::string& name, SteadyClock::time_point begin) {
   const double ms = std::chrono::duration<double, std::milli>(SteadyClock::now() - begin).count();
+  if (services_.note_time) services_.note_time(name, ms);
   const std::lock_guard lock(document_mutex_);
   timings_[name] = ms;
 }
@@ -132,11 +156,11 @@ protocol::SessionDocument Session::describe(const Document& document) const {
   const bool is_ready = document.state == protocol::SessionState::kReady;
   protocol::SessionDocument result;
   result.summary = {.id = params_.id,
-                    .name = params_.name,
+                    .name = document.name,
                     .cloud = params_.cloud_id,
                     .state = document.state,
                     .revision = document.revision,
-                    .created = created_,
+                    .created = params_.created,
                     .sample_count = is_ready ? document.surface.samples->size() : params_.cloud->size()};
   result.progress = context_.progress();
   result.error = document.error;
@@ -145,13 +169,15 @@ protocol::SessionDocument Session::describe(const Document& document) const {
   for (const float scale : params_.hierarchy.scales)
     result.level_scales.push_back(static_cast<double>(scale) * static_cast<double>(rest_.diagonal));
   result.level_scales.push_back(0.0);
-  if (is_ready) {
-    result.spacing = document.spacing;
-    result.decomposition = *document.surface.reports;
+  if (document.edits != nullptr) {
     result.zero = {.samples = document.zero.samples, .operations = document.zero.operations->size()};
     result.one = {.samples = document.one.samples, .operations = document.one.operations->size()};
     result.head = static_cast<std::uint32_t>(document.head);
     result.edits = static_cast<std::uint32_t>(document.edits->size());
+  }
+  if (is_ready) {
+    result.spacing = document.spacing;
+    result.decomposition = *document.surface.reports;
   }
   const std::lock_guard lock(document_mutex_);
   result.timings_ms.assign(timings_.begin(), timings_.end());
@@ -165,7 +191,7 @@ void Session::close(std::string reason) {
     closed_ = std::move(reason);
   }
   context_.cancel();
-  feed_.notify();
+  feed_->notify();
 }
 
 std::optional<std::string> Session::closed_reason() const {
@@ -187,10 +213,12 @@ Outcome<Done> Session::check_revision(Expected expected) const {
                  .revision = revision};
 }
 
-Outcome<Done> Session::close_at(std::string reason, std::uint64_t revision) {
+Outcome<Done> Session::close_at(std::string reason, std::uint64_t revision,
+                                const std::function<Outcome<Done>()>& also) {
   return on_strand([&, this]() -> Outcome<Done> {
     if (auto open = check_open(); !open.ok()) return open;
     if (auto current = check_revision(revision); !current.ok()) return current;
+    if (auto done = also(); !done.ok()) return done;
     close(std::move(reason));
     return Done{};
   });
@@ -201,6 +229,8 @@ Outcome<SharedDocument> Session::ready_document() const {
   SharedDocument now = document();
   if (now->state == protocol::SessionState::kBuilding)
     return Problem{.kind = ProblemKind::kWrongState, .detail = "the session is still building"};
+  if (now->state == protocol::SessionState::kFailed && now->error->kind == ProblemKind::kDamaged)
+    return *now->error;
   if (now->state == protocol::SessionState::kFailed)
     return Problem{.kind = ProblemKind::kWrongState,
                    .detail = "the session could not be built: " + now->error->detail};
@@ -230,7 +260,7 @@ void Session::show_committed() {
   shows_preview_ = false;
   published_field_ = shown_field_.t;
   display_.publish(picture_of(*now, now->surface, shown_field_, 0));
-  feed_.notify();
+  feed_->notify();
 }
 
 Outcome<Done> Session::ensure_level(std::uint32_t level) {
@@ -351,17 +381,17 @@ Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request, Expe
       return Done{};
     });
   if (!verdict->ok()) return *verdict;
-  const std::lock_guard lock(preview_mutex_);
+  const std::lock_guard lock(drags_.mutex);
   // Under the lock: a change that comes after this drops the pending preview.
   if (auto current = check_revision(expected); !current.ok()) return current;
   const auto now = SteadyClock::now();
-  if (request.sequence < newest_sequence_ && now - newest_sequence_time_ < kReorderWindow) return Done{};
-  if (request.sequence <= ended_sequence_ && now - ended_sequence_time_ < kReorderWindow) return Done{};
-  newest_sequence_ = request.sequence;
-  newest_sequence_time_ = now;
-  pending_preview_ = std::make_shared<const protocol::PreviewRequest>(request);
-  if (!preview_scheduled_) {
-    preview_scheduled_ = true;
+  if (request.sequence < drags_.newest_sequence && now - drags_.newest_time < kReorderWindow) return Done{};
+  if (request.sequence <= drags_.ended_sequence && now - drags_.ended_time < kReorderWindow) return Done{};
+  drags_.newest_sequence = request.sequence;
+  drags_.newest_time = now;
+  drags_.pending = std::make_shared<const protocol::PreviewRequest>(request);
+  if (!drags_.is_scheduled) {
+    drags_.is_scheduled = true;
     strand_.post([self = shared_from_this()] { self->run_preview(); });
   }
   return Done{};
@@ -370,9 +400,9 @@ Outcome<Done> Session::put_preview(const protocol::PreviewRequest& request, Expe
 void Session::run_preview() {
   std::shared_ptr<const protocol::PreviewRequest> request;
   {
-    const std::lock_guard lock(preview_mutex_);
-    request.swap(pending_preview_);
-    preview_scheduled_ = false;
+    const std::lock_guard lock(drags_.mutex);
+    request.swap(drags_.pending);
+    drags_.is_scheduled = false;
   }
   if (!request || closed_reason()) return;
   const auto begin = SteadyClock::now();
@@ -387,7 +417,7 @@ void Session::run_preview() {
   shows_preview_ = true;
   display_.publish(picture_of(*document(), after.value(), shown_field_, request->sequence));
   note_time("preview", begin);
-  feed_.notify();
+  feed_->notify();
 }
 
 Outcome<SharedFrame> Session::render_preview(const protocol::PreviewRequest& request,
@@ -408,13 +438,13 @@ Outcome<SharedFrame> Session::render_preview(const protocol::PreviewRequest& req
 }
 
 void Session::end_drag() {
-  const std::lock_guard lock(preview_mutex_);
-  pending_preview_.reset();
-  if (newest_sequence_ == 0) return;
+  const std::lock_guard lock(drags_.mutex);
+  drags_.pending.reset();
+  if (drags_.newest_sequence == 0) return;
   // Another drag may count anew, but what was overtaken by the end of this one must not be shown.
-  ended_sequence_ = newest_sequence_;
-  ended_sequence_time_ = SteadyClock::now();
-  newest_sequence_ = 0;
+  drags_.ended_sequence = drags_.newest_sequence;
+  drags_.ended_time = SteadyClock::now();
+  drags_.newest_sequence = 0;
 }
 
 Outcome<Done> Session::end_preview() {

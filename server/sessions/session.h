@@ -15,6 +15,9 @@
 #include "server/sessions/document.h"
 #include "server/sessions/edit_drag.h"
 #include "server/sessions/feed.h"
+#include "server/sessions/keeper.h"
+#include "server/sessions/last_preview.h"
+#include "server/sessions/presence.h"
 #include "server/sessions/session_params.h"
 
 namespace pointwright::server {
@@ -24,22 +27,26 @@ namespace pointwright::server {
 /// Document and never wait.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  /// Makes the session and starts building its hierarchy.
+  /// Makes the session; start() starts building its hierarchy. create() does both.
+  static std::shared_ptr<Session> make(SessionParams params, SessionServices services);
+  void start();
   static std::shared_ptr<Session> create(SessionParams params, SessionServices services);
 
   [[nodiscard]] const std::string& id() const { return params_.id; }
-  [[nodiscard]] const std::string& name() const { return params_.name; }
+  [[nodiscard]] std::string name() const { return document()->name; }
+  [[nodiscard]] const std::string& owner() const { return params_.owner; }
   [[nodiscard]] const std::string& cloud_id() const { return params_.cloud_id; }
-  /// As it was uploaded.
-  [[nodiscard]] const Cloud& cloud() const { return *params_.cloud; }
+  [[nodiscard]] const Cloud& cloud() const { return *params_.cloud; }  ///< as it was uploaded
   [[nodiscard]] const SessionParams& params() const { return params_; }
-  /// Pre: the session is ready
-  [[nodiscard]] const RestModel& rest() const { return rest_; }
+  [[nodiscard]] const RestModel& rest() const { return rest_; }  ///< Pre: the session is ready
   /// Cancelled when the session is closed.
   [[nodiscard]] const ExecutionContext& context() const { return context_; }
   [[nodiscard]] SharedDocument document() const;
   [[nodiscard]] protocol::SessionDocument describe(const Document& document) const;
   [[nodiscard]] Progress progress() const { return context_.progress(); }
+  [[nodiscard]] bool is_waking() const;  ///< it was there before and is being built once more
+  /// Waits until it is built, or was not in time.
+  void wait_until_built(std::chrono::steady_clock::time_point deadline);
 
   struct Painted {
     SharedDocument document;
@@ -48,11 +55,12 @@ class Session : public std::enable_shared_from_this<Session> {
   /// The revision that a change was made for; none: any. Its problem: stale revision.
   using Expected = std::optional<std::uint64_t>;
   /// Paints one operation and appends it to the region's painting as it is recorded: resolved(). Problems:
-  /// wrong state, too many operations or vertices.
-  Outcome<Painted> paint(RegionKind kind, const PaintOperation& operation, Expected expected = {});
+  /// wrong state, too many operations or vertices; of this and all other changes: those of the keeper.
+  Outcome<Painted> paint(RegionKind kind, const PaintOperation& operation, Expected expected = {},
+                         const Seal<Painted>& seal = {});
   /// Replaces a region's whole painting; none: clears it.
   Outcome<Painted> replace_painting(RegionKind kind, const std::vector<PaintOperation>& operations,
-                                    Expected expected = {});
+                                    Expected expected = {}, const Seal<Painted>& seal = {});
 
   /// Asks for a preview to be shown. Returns once it is known to be possible; it is computed afterwards,
   /// unless a newer one replaces it before.
@@ -68,9 +76,11 @@ class Session : public std::enable_shared_from_this<Session> {
     std::shared_ptr<const RecordedEdit> record;
   };
   /// Records an edit. Problems: those of put_preview, a stale revision, too many edits.
-  Outcome<Committed> commit(const EditParams& params, Expected expected);
+  Outcome<Committed> commit(const EditParams& params, Expected expected, const Seal<Committed>& seal = {});
   /// Undo, redo, jump: keeps the first `edit` edits applied.
-  Outcome<SharedDocument> move_head(std::size_t edit, Expected expected = {});
+  Outcome<SharedDocument> move_head(std::size_t edit, Expected expected = {},
+                                    const Seal<SharedDocument>& seal = {});
+  Outcome<SharedDocument> rename(std::string name, Expected expected);  ///< problem: a stale revision
   /// The history as it stands, to go on from beside the session, and the document that it belongs to.
   struct Fork {
     SharedDocument document;
@@ -80,7 +90,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<Fork> fork(Expected expected);
   /// Puts a fork's history, the regions and the marks of its document in place of the session's own: one
   /// change. Problem: a stale revision where the session has changed since it was forked.
-  Outcome<SharedDocument> adopt(Fork fork);
+  Outcome<SharedDocument> adopt(Fork fork, const Seal<SharedDocument>& seal = {});
   /// The last state up to `edit` edits of the list that the history knows without replaying anything.
   /// Pre: the list was the session's at some time
   Outcome<History::Known> known_state(const EditList& edits, std::size_t edit);
@@ -98,28 +108,29 @@ class Session : public std::enable_shared_from_this<Session> {
   [[nodiscard]] std::uint16_t available_attributes(std::uint16_t asked) const;
 
   [[nodiscard]] Display& display() { return display_; }
-  [[nodiscard]] Feed& feed() { return feed_; }
+  [[nodiscard]] Feed& feed() { return *feed_; }
+  [[nodiscard]] Presence& presence() const { return *presence_; }
 
   /// Ends the session: building is cancelled, streams end with the reason, changes are refused.
   void close(std::string reason);
-  /// The same, once the changes before it are done, and only at the expected revision.
-  Outcome<Done> close_at(std::string reason, std::uint64_t revision);
+  /// The same, once the changes before it are done, only at the expected revision, and only if `also`
+  /// succeeds.
+  Outcome<Done> close_at(std::string reason, std::uint64_t revision,
+                         const std::function<Outcome<Done>()>& also);
   [[nodiscard]] std::optional<std::string> closed_reason() const;
 
  private:
-  struct FieldKey {
-    std::shared_ptr<const MultiresSurface> surface;
-    std::shared_ptr<const Marks> marks;
-    std::uint32_t level = 0;
-    Blend blend = Blend::kQuartic;
-    friend bool operator==(const FieldKey&, const FieldKey&) = default;
-  };
   Session(SessionParams params, SessionServices services);
   // Everything below runs on the strand, except where it says otherwise.
-  void build();  // on the background pool
+  void build();  // on the background pool, as the next four
   void finish_building(Result<Hierarchy> built);
+  std::optional<protocol::Problem> bring_back(Document& document);
+  std::optional<protocol::Problem> replay(const RecordedEdit& record);
   void fail(protocol::Problem problem);  // while building
-  void publish(Document document);
+  void publish(SharedDocument document);
+  void publish(Document document) { publish(std::make_shared<const Document>(std::move(document))); }
+  template <typename T>
+  Outcome<Done> keep(const Document& before, const Document& after, const Seal<T>& seal, const T& result);
   void show_committed();
   void run_preview();
   void schedule_field();
@@ -132,9 +143,9 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<Done> ensure_level(std::uint32_t level);
   Outcome<SurfaceState> compute(const EditParams& params, ResamplingEffort effort);
   void forget_drag();
-  void take_over_history(Document& document) const;
+  void take_over_history(Document& document, const History& history) const;
   Outcome<Painted> repaint(RegionKind kind, const std::vector<PaintOperation>& operations, bool append,
-                           Expected expected);
+                           Expected expected, const Seal<Painted>& seal);
   [[nodiscard]] std::optional<Outcome<Done>> known_verdict(const Document& document,
                                                            const EditParams& params) const;
   Outcome<SharedDocument> ready_document() const;  // any thread
@@ -153,11 +164,12 @@ class Session : public std::enable_shared_from_this<Session> {
 
   const SessionParams params_;
   const SessionServices services_;
-  const protocol::TimePoint created_ = std::chrono::system_clock::now();
   ExecutionContext context_;
   Strand strand_;
   Display display_;
-  Feed feed_;
+  std::shared_ptr<Feed> feed_ = std::make_shared<Feed>();
+  /// Shared: viewers that outlive the session leave it too.
+  std::shared_ptr<Presence> presence_;
 
   mutable std::mutex document_mutex_;  // guards document_, timings_ and closed_
   SharedDocument document_;
@@ -172,12 +184,6 @@ class Session : public std::enable_shared_from_this<Session> {
   std::shared_ptr<const ScaleField> published_field_;  // that of the committed picture which is shown
   std::uint32_t active_level_ = 0;
   bool shows_preview_ = false;
-  struct LastPreview {
-    FieldKey base;
-    EditParams params;
-    SurfaceState after;
-    bool exact = true;  // what a commit would record
-  };
   std::optional<LastPreview> last_preview_;
   EditDrag drag_;
   std::optional<std::pair<FieldKey, PaintedField>> last_field_;  // that could be made
@@ -188,13 +194,7 @@ class Session : public std::enable_shared_from_this<Session> {
   RegionField field_;
   std::atomic<bool> field_scheduled_{false};
 
-  std::mutex preview_mutex_;  // guards the pending preview and the numbers of the drags
-  std::shared_ptr<const protocol::PreviewRequest> pending_preview_;
-  bool preview_scheduled_ = false;
-  std::uint64_t newest_sequence_ = 0;
-  std::chrono::steady_clock::time_point newest_sequence_time_;
-  std::uint64_t ended_sequence_ = 0;  // the last one of the drag before
-  std::chrono::steady_clock::time_point ended_sequence_time_;
+  DragTurns drags_;
 };
 
 }  // namespace pointwright::server

@@ -22,23 +22,32 @@ protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) 
 
 }  // namespace
 
-Outcome<Session::Painted> Session::paint(RegionKind kind, const PaintOperation& operation,
-                                         Expected expected) {
+template <typename T>
+Outcome<Done> Session::keep(const Document& before, const Document& after, const Seal<T>& seal,
+                            const T& result) {
+  if (params_.keeper == nullptr) return Done{};
+  if (!seal) return params_.keeper->keep(before, after, nullptr);
+  const KeptAnswer answer = seal(result);
+  return params_.keeper->keep(before, after, &answer);
+}
+
+Outcome<Session::Painted> Session::paint(RegionKind kind, const PaintOperation& operation, Expected expected,
+                                         const Seal<Painted>& seal) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
-  return on_strand([&, this] { return repaint(kind, {operation}, true, expected); });
+  return on_strand([&, this] { return repaint(kind, {operation}, true, expected, seal); });
 }
 
 Outcome<Session::Painted> Session::replace_painting(RegionKind kind,
                                                     const std::vector<PaintOperation>& operations,
-                                                    Expected expected) {
+                                                    Expected expected, const Seal<Painted>& seal) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
-  return on_strand([&, this] { return repaint(kind, operations, false, expected); });
+  return on_strand([&, this] { return repaint(kind, operations, false, expected, seal); });
 }
 
 Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<PaintOperation>& operations,
-                                           bool append, Expected expected) {
+                                           bool append, Expected expected, const Seal<Painted>& seal) {
   if (auto open = check_open(); !open.ok()) return open.problem();
   if (auto current = check_revision(expected); !current.ok()) return current.problem();
   const auto begin = SteadyClock::now();
@@ -65,15 +74,17 @@ Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<Pa
   after.one = painter.finish(RegionKind::kOne, *marks);
   after.marks = std::move(marks);
   ++after.revision;
-  publish(std::move(after));
+  result.document = std::make_shared<const Document>(std::move(after));
+  if (auto kept = keep(*before, *result.document, seal, result); !kept.ok()) return kept.problem();
+  publish(result.document);
   note_time("paint", begin);
   show_committed();
   schedule_field();
-  result.document = document();
   return result;
 }
 
-Outcome<Session::Committed> Session::commit(const EditParams& params, Expected expected) {
+Outcome<Session::Committed> Session::commit(const EditParams& params, Expected expected,
+                                            const Seal<Committed>& seal) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
   return on_strand([&, this]() -> Outcome<Committed> {
@@ -91,24 +102,29 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, Expected e
     if (!computed.ok()) return computed.problem();
     forget_drag();                 // the surface that it moved is the past
     Document after = *document();  // with the levels that computing may have derived
-    const auto record = record_of(before->head + 1, params, before->marks, after.surface, computed.value());
-    history_->push(record, computed.value());
-    after.marks = carried_marks(*after.surface.samples, after.marks, *history_->current().samples);
-    take_over_history(after);
-    publish(std::move(after));
+    const auto record = record_of(before->head + 1, params, before->marks, after.surface, computed.value(),
+                                  std::chrono::system_clock::now());
+    History next = *history_;  // shares its states; the session's own stays until the edit is kept
+    next.push(record, computed.value());
+    after.marks = carried_marks(*after.surface.samples, after.marks, *next.current().samples);
+    take_over_history(after, next);
+    const Committed result{.document = std::make_shared<const Document>(std::move(after)), .record = record};
+    if (auto kept = keep(*before, *result.document, seal, result); !kept.ok()) return kept.problem();
+    history_ = std::move(next);
+    publish(result.document);
     note_time("commit", begin);
     end_drag();
     show_committed();
     schedule_field();
-    return Committed{.document = document(), .record = record};
+    return result;
   });
 }
 
 // What a document says of the history, and of the marks that are in it already; one revision on.
-void Session::take_over_history(Document& document) const {
-  document.surface = history_->current();
-  document.edits = std::make_shared<const EditList>(history_->edits());
-  document.head = history_->head();
+void Session::take_over_history(Document& document, const History& history) const {
+  document.surface = history.current();
+  document.edits = std::make_shared<const EditList>(history.edits());
+  document.head = history.head();
   document.bounds = model_bounds(document.surface.surface->finest().position, params_.cloud->origin);
   document.spacing = median(document.surface.samples->sampling->spacing);
   document.zero.samples = count_marked(*document.marks, RegionKind::kZero);
@@ -116,7 +132,8 @@ void Session::take_over_history(Document& document) const {
   ++document.revision;
 }
 
-Outcome<SharedDocument> Session::move_head(std::size_t edit, Expected expected) {
+Outcome<SharedDocument> Session::move_head(std::size_t edit, Expected expected,
+                                           const Seal<SharedDocument>& seal) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
   return on_strand([&, this]() -> Outcome<SharedDocument> {
@@ -132,18 +149,42 @@ Outcome<SharedDocument> Session::move_head(std::size_t edit, Expected expected) 
     if (edit == before->head) return before;  // idempotent
     const auto begin = SteadyClock::now();
     forget_drag();  // replaying wants the memory
-    if (auto moved = history_->move_head(edit); !moved) return protocol::to_problem(moved.error());
+    History next = *history_;
+    if (auto moved = next.move_head(edit); !moved) {
+      history_ = std::move(next);  // with what was replayed so far
+      return protocol::to_problem(moved.error());
+    }
     Document after = *before;
     // The marks that the next edit was made with are of the samples that are there now.
     const SharedMarks recorded = edit < before->edits->size() ? (*before->edits)[edit]->marks : nullptr;
-    after.marks =
-        carried_marks(*before->surface.samples, before->marks, *history_->current().samples, recorded);
-    take_over_history(after);
-    publish(std::move(after));
+    after.marks = carried_marks(*before->surface.samples, before->marks, *next.current().samples, recorded);
+    take_over_history(after, next);
+    auto result = std::make_shared<const Document>(std::move(after));
+    if (auto kept = keep<SharedDocument>(*before, *result, seal, result); !kept.ok()) return kept.problem();
+    history_ = std::move(next);
+    publish(result);
     note_time("move_head", begin);
     show_committed();
     schedule_field();
-    return document();
+    return SharedDocument(result);
+  });
+}
+
+Outcome<SharedDocument> Session::rename(std::string name, Expected expected) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this]() -> Outcome<SharedDocument> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    if (auto current = check_revision(expected); !current.ok()) return current.problem();
+    Document after = *document();
+    if (after.name == name) return document();  // idempotent
+    after.name = std::move(name);
+    ++after.revision;
+    SharedDocument renamed = std::make_shared<const Document>(std::move(after));
+    if (auto kept = keep<SharedDocument>(*document(), *renamed, {}, renamed); !kept.ok())
+      return kept.problem();
+    publish(renamed);
+    return renamed;
   });
 }
 
@@ -157,19 +198,22 @@ Outcome<Session::Fork> Session::fork(Expected expected) {
   });
 }
 
-Outcome<SharedDocument> Session::adopt(Fork fork) {
+Outcome<SharedDocument> Session::adopt(Fork fork, const Seal<SharedDocument>& seal) {
   return on_strand([&, this]() -> Outcome<SharedDocument> {
     if (auto open = check_open(); !open.ok()) return open.problem();
     if (auto current = check_revision(fork.document->revision); !current.ok()) return current.problem();
     forget_drag();  // the surface that it moved is the past
-    history_ = std::move(fork.history);
     Document after = *fork.document;
-    take_over_history(after);
-    publish(std::move(after));
+    take_over_history(after, fork.history);
+    auto result = std::make_shared<const Document>(std::move(after));
+    if (auto kept = keep<SharedDocument>(*document(), *result, seal, result); !kept.ok())
+      return kept.problem();
+    history_ = std::move(fork.history);
+    publish(result);
     end_drag();
     show_committed();
     schedule_field();
-    return document();
+    return SharedDocument(result);
   });
 }
 

@@ -3,10 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "server/sessions/compute_pool.h"
+#include "server/sessions/document.h"
+#include "server/sessions/keeper.h"
 #include "server/sessions/surface_state.h"
 
 namespace pointwright::server {
@@ -15,6 +18,7 @@ namespace pointwright::server {
 struct SessionParams {
   std::string id;
   std::string name;
+  std::string owner;  ///< the id of a token; empty: made where none were in use
   std::string cloud_id;
   std::shared_ptr<const Cloud> cloud;
   HierarchyParams hierarchy;
@@ -23,6 +27,9 @@ struct SessionParams {
   std::size_t max_operations = 0;
   std::size_t max_painting_vertices = 1'000'000;
   std::shared_ptr<SampleRoom> room = std::make_shared<SampleRoom>(kNoParent);  ///< for its samples
+  protocol::TimePoint created = std::chrono::system_clock::now();
+  std::shared_ptr<SessionKeeper> keeper = nullptr;  ///< null: it ends with the process
+  std::shared_ptr<const Document> kept = nullptr;   ///< what it was before; null: it is new
 };
 
 /// What a session computes with: `background` for what lasts for seconds, `interactive` for a waiting hand.
@@ -31,6 +38,8 @@ struct SessionServices {
   ComputePool& background;
   HierarchyBuilder build;
   Resampler resample;
+  /// Told how many milliseconds each step took; may be empty.
+  std::function<void(const std::string&, double)> note_time = {};
 };
 
 }  // namespace pointwright::server

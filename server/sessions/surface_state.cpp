@@ -7,6 +7,7 @@
 #include "engine/core/parallel.h"
 #include "engine/editing/region.h"
 #include "engine/resampling/carried_sampling.h"
+#include "server/sessions/surface_hash.h"
 
 namespace pointwright::server {
 namespace {
@@ -186,16 +187,18 @@ std::size_t count_moved(const SurfaceState& before, const SurfaceState& after) {
 }
 
 std::shared_ptr<const RecordedEdit> record_of(std::size_t index, const EditParams& params, SharedMarks marks,
-                                              const SurfaceState& before, const SurfaceState& after) {
+                                              const SurfaceState& before, const SurfaceState& after,
+                                              std::chrono::system_clock::time_point created) {
   auto record = std::make_shared<RecordedEdit>();
   record->index = index;
   record->params = params;
-  record->created = std::chrono::system_clock::now();
+  record->created = created;
   record->moved_samples = count_moved(before, after);
   record->zero_samples = count_marked(*marks, RegionKind::kZero);
   record->one_samples = count_marked(*marks, RegionKind::kOne);
   record->change = change_of(*before.samples, *after.samples);
   record->sample_count = after.samples->size();
+  record->surface_hash = surface_hash(after);
   record->marks = std::move(marks);
   return record;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "engine/core/cloud.h"
@@ -96,11 +97,13 @@ struct RecordedEdit {
   std::size_t one_samples = 0;
   SampleChange change;
   std::size_t sample_count = 0;  ///< after it
+  std::string surface_hash;      ///< after it: surface_hash()
 };
 
 /// The record of an edit that leads from one state to the next.
 std::shared_ptr<const RecordedEdit> record_of(std::size_t index, const EditParams& params, SharedMarks marks,
-                                              const SurfaceState& before, const SurfaceState& after);
+                                              const SurfaceState& before, const SurfaceState& after,
+                                              std::chrono::system_clock::time_point created);
 
 /// All the steps of an edit from its record: the same bits as when it was made.
 Result<SurfaceState> replayed(const RestModel& rest, const SurfaceState& before, const RecordedEdit& record,

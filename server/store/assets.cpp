@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "server/base/sha256.h"
 #include "server/ingest/files.h"
-#include "server/store/sha256.h"
 
 namespace pointwright::server {
 namespace {

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "server/base/random_id.h"
+#include "server/base/sha256.h"
 #include "server/ingest/confined.h"
-#include "server/store/sha256.h"
 
 namespace pointwright::server {
 
@@ -45,8 +45,23 @@ ImageDecoder confined_image_decoder(const Limits& limits, std::shared_ptr<Decode
   };
 }
 
-ImageStore::ImageStore(const Limits& limits)
-    : max_images_(limits.max_images), limits_(image_limits(limits)), memory_(limits.max_image_bytes) {}
+ImageStore::ImageStore(const Limits& limits, Archive* archive)
+    : max_images_(limits.max_images),
+      limits_(image_limits(limits)),
+      archive_(archive),
+      memory_(limits.max_image_bytes) {}
+
+void ImageStore::restore(std::vector<KeptImage> images) {
+  const std::lock_guard lock(mutex_);
+  for (KeptImage& kept : images) {
+    auto stored = std::make_shared<StoredImage>();
+    stored->document = std::move(kept.document);
+    stored->sha256 = std::move(kept.sha256);
+    stored->owner = std::move(kept.owner);
+    stored->quota = std::move(kept.quota);
+    images_.push_back(std::move(stored));
+  }
+}
 
 Outcome<Done> ImageStore::check_room_locked() const {
   if (images_.size() < max_images_) return Done{};
@@ -61,40 +76,75 @@ Outcome<Done> ImageStore::check_room() const {
   return check_room_locked();
 }
 
-Outcome<SharedImage> ImageStore::add(const ImageDecoder& decode, std::span<const std::byte> file) {
-  if (file.empty()) return Problem{.kind = ProblemKind::kEmptyBody, .detail = "the upload has no bytes"};
+Outcome<std::shared_ptr<const ImageContent>> ImageStore::decoded(const ImageDecoder& decode,
+                                                                 std::span<const std::byte> file) const {
   // What the header claims is reserved before anything is decoded.
   const auto claim = png_gate(file, limits_);
   if (!claim) return protocol::to_problem(claim.error());
   const std::uint64_t claimed = claim.value().value_bytes + file.size();
-  auto stored = std::make_shared<StoredImage>();
-  stored->memory = memory_.hold(claimed);
-  if (stored->memory == nullptr)
+  auto content = std::make_shared<ImageContent>();
+  content->memory = memory_.hold(claimed);
+  if (content->memory == nullptr)
     return Problem{.kind = ProblemKind::kOutOfSpace,
                    .detail = "the memory for images is used up",
                    .limit = static_cast<double>(memory_.total()),
                    .actual = static_cast<double>(memory_.held() + claimed)};
-  auto decoded = decode(file);
-  if (!decoded) {
-    if (decoded.error().field == "decoder")
-      return Problem{.kind = ProblemKind::kOverloaded, .detail = decoded.error().message};
-    return protocol::to_problem(decoded.error());
+  auto image = decode(file);
+  if (!image) {
+    if (image.error().field == "decoder")
+      return Problem{.kind = ProblemKind::kOverloaded, .detail = image.error().message};
+    return protocol::to_problem(image.error());
   }
-  stored->memory->shrink_to(value_bytes(decoded.value()) + file.size());
-  auto image = std::make_shared<const Image>(std::move(decoded).value());
+  content->image = std::move(image).value();
+  content->memory->shrink_to(value_bytes(content->image) + file.size());
+  content->file.assign(reinterpret_cast<const char*>(file.data()), file.size());
+  return std::shared_ptr<const ImageContent>(std::move(content));
+}
+
+Outcome<SharedImage> ImageStore::add(const ImageDecoder& decode, std::span<const std::byte> file,
+                                     std::string owner, std::shared_ptr<const void> quota) {
+  if (file.empty()) return Problem{.kind = ProblemKind::kEmptyBody, .detail = "the upload has no bytes"};
+  auto content = decoded(decode, file);
+  if (!content.ok()) return content.problem();
+  const Image& image = content.value()->image;
+  auto stored = std::make_shared<StoredImage>();
   stored->document = {.id = random_id(),
-                      .width = image->width,
-                      .height = image->height,
-                      .channels = channels_of(*image),
+                      .width = image.width,
+                      .height = image.height,
+                      .channels = channels_of(image),
                       .bytes = file.size(),
                       .created = std::chrono::system_clock::now()};
+  stored->owner = std::move(owner);
+  stored->quota = std::move(quota);
   stored->sha256 = sha256_hex(file);
-  stored->file.assign(reinterpret_cast<const char*>(file.data()), file.size());
-  stored->image = std::move(image);
+  stored->content_ = std::move(content.value());
+  if (auto room = check_room(); !room.ok()) return room.problem();
+  if (archive_ != nullptr) {
+    auto kept = archive_->add(
+        KeptImage{.document = stored->document, .sha256 = stored->sha256, .owner = stored->owner}, file,
+        nullptr);
+    if (!kept.ok()) return kept.problem();
+  }
   const std::lock_guard lock(mutex_);
-  if (auto room = check_room_locked(); !room.ok()) return room.problem();
+  if (auto room = check_room_locked(); !room.ok()) {
+    if (archive_ != nullptr) (void)archive_->remove_image(stored->document.id, stored->sha256);
+    return room.problem();
+  }
   images_.push_back(stored);
   return SharedImage(stored);
+}
+
+Outcome<std::shared_ptr<const ImageContent>> ImageStore::content_of(const ImageDecoder& decode,
+                                                                    const StoredImage& image) const {
+  const std::lock_guard lock(image.mutex_);
+  if (image.content_ != nullptr) return image.content_;
+  POINTWRIGHT_CHECK(archive_ != nullptr, "content that is not there comes from an archive");
+  const auto file = archive_->file(image.sha256);
+  if (!file.ok()) return file.problem();
+  auto content = decoded(decode, file.value());
+  if (!content.ok()) return content;
+  image.content_ = content.value();
+  return content;
 }
 
 SharedImage ImageStore::find(const std::string& id) const {
@@ -112,6 +162,8 @@ Outcome<Done> ImageStore::remove(const std::string& id) {
   const std::lock_guard lock(mutex_);
   const auto it = std::find_if(images_.begin(), images_.end(), has_id(id));
   if (it == images_.end()) return Problem{.kind = ProblemKind::kNotFound, .detail = "there is no such image"};
+  if (archive_ != nullptr)
+    if (auto removed = archive_->remove_image(id, (*it)->sha256); !removed.ok()) return removed;
   images_.erase(it);
   return Done{};
 }

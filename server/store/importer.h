@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -17,19 +18,39 @@ namespace pointwright::server {
 using Decoder =
     std::function<Result<ImportedCloud>(std::span<const std::byte>, CloudFormat, const ImportParams&)>;
 
+/// The same for an open file of so many bytes.
+using FileDecoder =
+    std::function<Result<ImportedCloud>(int, std::uint64_t, CloudFormat, const ImportParams&)>;
+
 /// The confined decoder; the slots are those of all decoders.
 Decoder confined_decoder(std::shared_ptr<DecodeSlots> slots);
+/// A long file has longer: a second for every 16 MiB beyond the ordinary deadline.
+FileDecoder confined_file_decoder(std::shared_ptr<DecodeSlots> slots);
 
 struct ImportRequest {
   std::string name;
   std::string media_type;  ///< says the format; application/octet-stream or empty: found by looking
   bool drop_non_finite = false;
+  std::optional<CloudFormat> format = std::nullopt;  ///< says the format before all else
+  std::string owner = {};                            ///< as in StoredCloud
+  std::shared_ptr<const void> quota = {};
 };
 
+/// How stored clouds are made of their files once more: as import_cloud() does.
+CloudLoader cloud_loader(FileDecoder decode_file, Decoder decode, ComputePool& pool, const Limits& limits);
+
 /// Decodes, puts the cloud in order on `pool`, and stores it. Blocks until that is done.
-/// Problems: empty body, everything that decoding refuses, too many clouds, out of space, overloaded.
+/// Problems: empty body, everything that decoding refuses, overloaded; those of CloudStore::add().
 Outcome<SharedCloud> import_cloud(CloudStore& store, const Decoder& decode, ComputePool& pool,
                                   const Limits& limits, std::span<const std::byte> bytes,
-                                  const ImportRequest& request);
+                                  const ImportRequest& request,
+                                  const Seal<protocol::CloudDocument>& seal = {});
+
+/// The same from a file of the data folder that does not change any more: its bytes are not held in memory
+/// where there is a `decode_file`.
+Outcome<SharedCloud> import_cloud(CloudStore& store, const FileDecoder& decode_file, const Decoder& decode,
+                                  ComputePool& pool, const Limits& limits, const BlobContent& file,
+                                  const ImportRequest& request,
+                                  const Seal<protocol::CloudDocument>& seal = {});
 
 }  // namespace pointwright::server

@@ -1,6 +1,7 @@
 #include "server/store/session_store.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "engine/multires/normal_stencil.h"
 #include "server/base/random_id.h"
@@ -34,99 +35,354 @@ constexpr std::uint64_t kBytesInSampling = 38;
 constexpr std::uint64_t kHistoryStates = 32;
 constexpr std::uint64_t kStateBytesPerSample = 52;
 
+constexpr std::chrono::seconds kExpiryInterval{10};
+
+Problem no_such_session() {
+  return {.kind = ProblemKind::kNotFound, .detail = "there is no such session"};
+}
+
 }  // namespace
 
-SessionStore::SessionStore(const Limits& limits, SessionServices services)
-    : limits_(limits), services_(std::move(services)), memory_(limits.max_session_bytes) {}
+SessionStore::SessionStore(const Limits& limits, const CloudStore& clouds, SessionServices services,
+                           Archive* archive)
+    : limits_(limits),
+      clouds_(clouds),
+      services_(std::move(services)),
+      archive_(archive),
+      memory_(limits.max_session_bytes) {
+  if (limits_.session_idle_expiry_s > 0)
+    watcher_ = std::jthread([this](const std::stop_token& stop) { watch_expiry(stop); });
+}
 
 SessionStore::~SessionStore() {
+  watcher_ = {};
   close_all("the server is stopping");
 }
 
-Outcome<std::shared_ptr<Session>> SessionStore::create(const CloudStore& clouds,
-                                                       const protocol::CreateSessionRequest& request) {
+bool SessionStore::Entry::is_idle() const {
+  return session == nullptr ||
+         (session.use_count() == 1 && session->document()->state != protocol::SessionState::kBuilding);
+}
+
+SessionStore::Needs SessionStore::needs_of(const HierarchyParams& params, const Cloud& cloud) const {
+  const std::uint64_t samples = cloud.size();
+  const std::uint64_t more_bands = (params.scales.size() - 1) * kBytesPerBand;
+  const std::uint64_t drag = (params.scales.size() + 1) * kStencilBytes + kShapeBytes;
+  const std::uint64_t graph = params.neighbors * kBytesPerNeighbor;
+  const std::uint64_t live_each = kBytesPerSample + kLiveSurfaces * more_bands + drag + graph;
+  const std::uint64_t columns = memory_of(cloud) / std::max<std::uint64_t>(samples, 1);
+  return {.live = samples * live_each,
+          .history =
+              std::min(limits_.history_bytes, samples * kHistoryStates * (kStateBytesPerSample + more_bands)),
+          .inserted_each = live_each + kSamplings * (kBytesInSampling + graph + columns)};
+}
+
+SessionParams SessionStore::params_of(const KeptSession& kept, std::shared_ptr<const Cloud> cloud,
+                                      const Needs& needs, const std::shared_ptr<Budget::Hold>& memory) const {
+  const std::uint64_t samples = std::max<std::uint64_t>(cloud->size(), kept.samples);
+  return {.id = kept.id,
+          .name = kept.name,
+          .owner = kept.owner,
+          .cloud_id = kept.cloud,
+          .cloud = std::move(cloud),
+          .hierarchy = kept.params,
+          .history_bytes = needs.history,
+          .max_edits = static_cast<std::size_t>(limits_.max_edits),
+          .max_operations = static_cast<std::size_t>(limits_.max_operations),
+          .max_painting_vertices = static_cast<std::size_t>(limits_.max_painting_vertices),
+          .room = std::make_shared<SampleRoom>(std::max(limits_.max_session_samples, samples), memory,
+                                               samples, needs.inserted_each),
+          .created = kept.created,
+          .keeper = archive_ == nullptr ? nullptr : archive_->keeper(kept.id)};
+}
+
+std::vector<SessionStore::Entry>::iterator SessionStore::entry_of(const std::string& id) {
+  return std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.kept.id == id; });
+}
+
+void SessionStore::restore(std::vector<KeptSession> sessions) {
+  const std::lock_guard lock(mutex_);
+  for (KeptSession& kept : sessions) {
+    Entry entry;
+    entry.cloud_use = clouds_.use(kept.cloud);
+    if (entry.cloud_use == nullptr && !kept.damage) kept.damage = "what is stored of its cloud is damaged";
+    entry.quota = std::move(kept.quota);
+    entry.kept = std::move(kept);
+    entry.kept.used = std::chrono::system_clock::now();  // nobody could ask while nothing ran
+    entries_.push_back(std::move(entry));
+  }
+}
+
+void SessionStore::put_to_sleep(Entry& entry) {
+  const SharedDocument document = entry.session->document();
+  entry.kept.name = document->name;
+  entry.kept.revision = document->revision;
+  entry.kept.head = document->head;
+  if (document->surface.samples != nullptr) entry.kept.samples = document->surface.samples->size();
+  if (document->error && document->error->kind == ProblemKind::kDamaged)
+    entry.kept.damage = document->error->detail;
+  entry.session.reset();  // all of it is in the archive
+  entry.memory.reset();
+}
+
+Outcome<std::shared_ptr<Budget::Hold>> SessionStore::room_for(std::uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  if (auto memory = memory_.hold(bytes)) return memory;
+  const auto refused = [&](ProblemKind kind, const char* detail) {
+    return Problem{.kind = kind,
+                   .detail = detail,
+                   .limit = static_cast<double>(memory_.total()),
+                   .actual = static_cast<double>(memory_.held() + bytes)};
+  };
+  if (archive_ == nullptr || bytes > memory_.total())
+    return refused(ProblemKind::kOutOfSpace, "the memory for sessions is used up");
+  std::vector<Entry*> idle;
+  std::uint64_t gain = memory_.total() - std::min(memory_.held(), memory_.total());
+  for (Entry& entry : entries_) {
+    if (entry.session == nullptr || !entry.is_idle()) continue;
+    idle.push_back(&entry);
+    gain += entry.bytes;
+  }
+  if (gain < bytes)
+    return refused(ProblemKind::kOverloaded, "sessions that are in use take the memory for sessions");
+  std::stable_sort(idle.begin(), idle.end(),
+                   [](const Entry* a, const Entry* b) { return a->kept.used < b->kept.used; });
+  for (Entry* entry : idle) {
+    put_to_sleep(*entry);
+    if (auto memory = memory_.hold(bytes)) return memory;
+  }
+  return refused(ProblemKind::kOverloaded, "sessions that are in use take the memory for sessions");
+}
+
+Outcome<std::shared_ptr<Session>> SessionStore::create(const protocol::CreateSessionRequest& request,
+                                                       const Caller& caller,
+                                                       std::shared_ptr<const void> quota,
+                                                       const Seal<std::shared_ptr<Session>>& seal) {
   Entry entry;
-  entry.cloud_use = clouds.use(request.cloud);
-  const SharedCloud cloud = entry.cloud_use == nullptr ? nullptr : clouds.find(request.cloud);
-  if (cloud == nullptr)
+  entry.quota = std::move(quota);
+  entry.cloud_use = clouds_.use(request.cloud);
+  const SharedCloud cloud = entry.cloud_use == nullptr ? nullptr : clouds_.find(request.cloud);
+  if (cloud == nullptr || !caller.may_see(cloud->owner))
     return Problem{.kind = ProblemKind::kNotFound,
                    .detail = "there is no cloud with that id",
                    .errors = {{.pointer = "/cloud", .detail = "no such cloud"}}};
-  const std::uint64_t samples = cloud->cloud->size();
-  const std::uint64_t more_bands = (request.params.scales.size() - 1) * kBytesPerBand;
-  const std::uint64_t drag = (request.params.scales.size() + 1) * kStencilBytes + kShapeBytes;
-  const std::uint64_t graph = request.params.neighbors * kBytesPerNeighbor;
-  const std::uint64_t live_each = kBytesPerSample + kLiveSurfaces * more_bands + drag + graph;
-  const std::uint64_t live = samples * live_each;
-  const std::uint64_t columns = memory_of(*cloud->cloud) / std::max<std::uint64_t>(samples, 1);
-  const std::uint64_t inserted_each = live_each + kSamplings * (kBytesInSampling + graph + columns);
-  const std::uint64_t history =
-      std::min(limits_.history_bytes, samples * kHistoryStates * (kStateBytesPerSample + more_bands));
-  const std::lock_guard lock(mutex_);
-  if (entries_.size() >= limits_.max_sessions)
-    return Problem{.kind = ProblemKind::kTooMany,
-                   .detail = "the server holds as many sessions as it may",
-                   .limit = static_cast<double>(limits_.max_sessions),
-                   .actual = static_cast<double>(entries_.size())};
-  auto memory = memory_.hold(live + history);
-  if (memory == nullptr)
-    return Problem{.kind = ProblemKind::kOutOfSpace,
-                   .detail = "the memory for sessions is used up",
-                   .limit = static_cast<double>(memory_.total()),
-                   .actual = static_cast<double>(memory_.held() + live + history)};
-  entry.session =
-      Session::create({.id = random_id(),
-                       .name = request.name.empty() ? cloud->document.name : request.name,
-                       .cloud_id = request.cloud,
-                       .cloud = cloud->cloud,
-                       .hierarchy = request.params,
-                       .history_bytes = history,
-                       .max_edits = static_cast<std::size_t>(limits_.max_edits),
-                       .max_operations = static_cast<std::size_t>(limits_.max_operations),
-                       .max_painting_vertices = static_cast<std::size_t>(limits_.max_painting_vertices),
-                       .room = std::make_shared<SampleRoom>(std::max(limits_.max_session_samples, samples),
-                                                            memory, samples, inserted_each)},
-                      services_);
-  entry.memory = std::move(memory);
-  entries_.push_back(entry);
-  return entry.session;
+  auto samples = clouds_.samples_of(*cloud);
+  if (!samples.ok()) return samples.problem();
+  {
+    const std::lock_guard lock(mutex_);
+    if (entries_.size() + coming_ >= limits_.max_sessions)
+      return Problem{.kind = ProblemKind::kTooMany,
+                     .detail = "the server holds as many sessions as it may",
+                     .limit = static_cast<double>(limits_.max_sessions),
+                     .actual = static_cast<double>(entries_.size() + coming_)};
+    ++coming_;
+  }
+  const std::shared_ptr<const void> counted(nullptr, [this](const void*) {
+    const std::lock_guard lock(mutex_);
+    --coming_;
+  });
+  const Needs needs = needs_of(request.params, *samples.value());
+  entry.bytes = needs.live + needs.history;
+  auto memory = room_for(entry.bytes);
+  if (!memory.ok()) return memory.problem();
+  entry.memory = std::move(memory.value());
+  const auto now = std::chrono::system_clock::now();
+  entry.kept = {.id = random_id(),
+                .owner = caller.token,
+                .cloud = request.cloud,
+                .name = request.name.empty() ? cloud->document.name : request.name,
+                .params = request.params,
+                .created = now,
+                .used = now,
+                .samples = samples.value()->size(),
+                .damage = std::nullopt};
+  const auto session = Session::make(params_of(entry.kept, samples.value(), needs, entry.memory), services_);
+  if (archive_ != nullptr) {
+    std::optional<KeptAnswer> answer;
+    if (seal) answer = seal(session);
+    auto kept = archive_->add(entry.kept, answer ? &*answer : nullptr);
+    if (!kept.ok()) return kept.problem();
+  }
+  entry.session = session;
+  {
+    const std::lock_guard lock(mutex_);
+    entries_.push_back(std::move(entry));
+  }
+  session->start();
+  return session;
 }
 
-std::shared_ptr<Session> SessionStore::find(const std::string& id) const {
-  const std::lock_guard lock(mutex_);
-  const auto it =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.session->id() == id; });
-  return it == entries_.end() ? nullptr : it->session;
+Outcome<std::shared_ptr<Session>> SessionStore::get(const std::string& id) {
+  std::shared_ptr<std::mutex> turn;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto entry = entry_of(id);
+    if (entry == entries_.end()) return no_such_session();
+    entry->kept.used = std::chrono::system_clock::now();
+    if (entry->session != nullptr) return entry->session;
+    turn = entry->turn;
+  }
+  const std::lock_guard waking(*turn);
+  return wake(id);
 }
 
-std::vector<std::shared_ptr<Session>> SessionStore::list() const {
+void SessionStore::mark_damaged(const std::string& id, const std::string& reason) {
+  archive_->keeper(id)->give_up(reason);
+  const std::lock_guard lock(mutex_);
+  const auto entry = entry_of(id);
+  if (entry != entries_.end()) entry->kept.damage = reason;
+}
+
+Outcome<std::shared_ptr<Session>> SessionStore::wake(const std::string& id) {
+  KeptSession kept;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto entry = entry_of(id);
+    if (entry == entries_.end()) return no_such_session();
+    if (entry->session != nullptr) return entry->session;
+    if (entry->kept.damage) return Problem{.kind = ProblemKind::kDamaged, .detail = *entry->kept.damage};
+    kept = entry->kept;
+  }
+  auto document = archive_->load(id);
+  if (!document.ok()) {
+    if (document.problem().kind == ProblemKind::kDamaged) mark_damaged(id, document.problem().detail);
+    return document.problem();
+  }
+  const SharedCloud cloud = clouds_.find(kept.cloud);
+  if (cloud == nullptr) return no_such_session();
+  auto samples = clouds_.samples_of(*cloud);
+  // A cloud whose file is damaged may be uploaded again: the session itself is whole.
+  if (!samples.ok()) return samples.problem();
+  Needs needs = needs_of(kept.params, *samples.value());
+  // Those that edits inserted come back with it.
+  const std::uint64_t inserted =
+      kept.samples - std::min<std::uint64_t>(kept.samples, samples.value()->size());
+  needs.live += inserted * needs.inserted_each;
+  auto memory = room_for(needs.live + needs.history);
+  if (!memory.ok()) return memory.problem();
+  SessionParams params = params_of(kept, samples.value(), needs, memory.value());
+  params.kept = document.value();
+  const auto session = Session::make(std::move(params), services_);
+  {
+    const std::lock_guard lock(mutex_);
+    const auto entry = entry_of(id);
+    if (entry == entries_.end()) return no_such_session();
+    entry->session = session;
+    entry->memory = std::move(memory.value());
+    entry->bytes = needs.live + needs.history;
+  }
+  session->start();
+  return session;
+}
+
+std::vector<std::shared_ptr<Session>> SessionStore::awake() const {
   const std::lock_guard lock(mutex_);
   std::vector<std::shared_ptr<Session>> sessions;
-  for (const Entry& entry : entries_) sessions.push_back(entry.session);
+  for (const Entry& entry : entries_)
+    if (entry.session != nullptr) sessions.push_back(entry.session);
   return sessions;
 }
 
+std::optional<std::string> SessionStore::owner_of(const std::string& id) const {
+  const std::lock_guard lock(mutex_);
+  const auto entry =
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.kept.id == id; });
+  return entry == entries_.end() ? std::nullopt : std::optional<std::string>(entry->kept.owner);
+}
+
+std::vector<protocol::SessionSummary> SessionStore::summaries(const MaySee& may_see) const {
+  const std::lock_guard lock(mutex_);
+  std::vector<protocol::SessionSummary> summaries;
+  for (const Entry& entry : entries_) {
+    if (may_see && !may_see(entry.kept.owner, entry.kept.id)) continue;
+    if (entry.session != nullptr) {
+      summaries.push_back(entry.session->describe(*entry.session->document()).summary);
+      continue;
+    }
+    const KeptSession& kept = entry.kept;
+    summaries.push_back(
+        {.id = kept.id,
+         .name = kept.name,
+         .cloud = kept.cloud,
+         .state = kept.damage ? protocol::SessionState::kFailed : protocol::SessionState::kAsleep,
+         .revision = kept.revision,
+         .created = kept.created,
+         .sample_count = kept.samples});
+  }
+  return summaries;
+}
+
 Outcome<Done> SessionStore::remove(const std::string& id, Session::Expected expected) {
-  if (const auto session = expected ? find(id) : nullptr)
-    if (auto closed = session->close_at("the session was deleted", *expected); !closed.ok()) return closed;
-  Entry removed;
+  std::shared_ptr<std::mutex> turn;
   {
     const std::lock_guard lock(mutex_);
-    const auto it =
-        std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.session->id() == id; });
-    if (it == entries_.end())
-      return Problem{.kind = ProblemKind::kNotFound, .detail = "there is no such session"};
-    removed = std::move(*it);
-    entries_.erase(it);
+    const auto entry = entry_of(id);
+    if (entry == entries_.end()) return no_such_session();
+    turn = entry->turn;
   }
-  removed.session->close("the session was deleted");
+  const std::lock_guard removing(*turn);
+  std::shared_ptr<Session> session;
+  std::uint64_t revision = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto entry = entry_of(id);
+    if (entry == entries_.end()) return no_such_session();
+    session = entry->session;  // and it stays awake
+    revision = entry->kept.revision;
+  }
+  const std::string reason = "the session was deleted";
+  const auto forget = [&]() -> Outcome<Done> {
+    return archive_ == nullptr ? Outcome<Done>(Done{}) : archive_->remove_session(id);
+  };
+  if (session != nullptr && expected) {
+    if (auto closed = session->close_at(reason, *expected, forget); !closed.ok()) return closed;
+  } else {
+    if (expected && *expected != revision)
+      return Problem{.kind = ProblemKind::kStaleRevision,
+                     .detail = "the session is at revision " + std::to_string(revision) + ", not " +
+                               std::to_string(*expected),
+                     .revision = revision};
+    if (auto forgotten = forget(); !forgotten.ok()) return forgotten;
+    if (session != nullptr) session->close(reason);
+  }
+  Entry removed;
+  const std::lock_guard lock(mutex_);
+  const auto entry = entry_of(id);
+  if (entry == entries_.end()) return no_such_session();
+  removed = std::move(*entry);
+  entries_.erase(entry);
   return Done{};
+}
+
+std::size_t SessionStore::expire(protocol::TimePoint last_used) {
+  std::vector<std::string> expired;
+  {
+    const std::lock_guard lock(mutex_);
+    for (Entry& entry : entries_) {
+      if (!entry.is_idle())
+        entry.kept.used = std::chrono::system_clock::now();
+      else if (entry.kept.used <= last_used)
+        expired.push_back(entry.kept.id);
+    }
+  }
+  std::size_t count = 0;
+  for (const std::string& id : expired) count += remove(id).ok() ? 1 : 0;
+  return count;
+}
+
+void SessionStore::watch_expiry(const std::stop_token& stop) {
+  const std::chrono::seconds idle(limits_.session_idle_expiry_s);
+  while (!stop.stop_requested()) {
+    (void)expire(std::chrono::system_clock::now() - idle);
+    std::unique_lock lock(mutex_);
+    watch_.wait_for(lock, stop, std::min(kExpiryInterval, idle), [] { return false; });
+  }
 }
 
 // Not const: the sessions that it ends belong to the store.
 // NOLINTNEXTLINE(readability-make-member-function-const)
 void SessionStore::close_all(const std::string& reason) {
-  for (const auto& session : list()) session->close(reason);
+  for (const auto& session : awake()) session->close(reason);
 }
 
 }  // namespace pointwright::server

@@ -95,6 +95,18 @@ TEST_CASE("a stretched sheet gets samples, and undo, redo and a recipe give the 
     REQUIRE(now.size() == 1600 + inserted);
     CHECK(now.color.size() == now.size());
     CHECK(widest_gap(now) < 0.5 * gap);
+    const Cloud measured = cloud_of(
+        daemon.get(session + "/samples?format=ply&attributes=stretch,minor_stretch,anisotropy,area_change")
+            .body);
+    REQUIRE(measured.scalars.size() == 4);
+    const auto column = [&](std::size_t i) {
+      return std::get<std::vector<float>>(measured.scalars[i].values);
+    };
+    for (std::size_t i = 0; i < measured.size(); i += 97) {
+      CHECK(column(0)[i] >= column(1)[i]);
+      CHECK(column(2)[i] == doctest::Approx(double{column(0)[i]} / double{column(1)[i]}).epsilon(1e-5));
+      CHECK(column(3)[i] == doctest::Approx(double{column(0)[i]} * double{column(1)[i]}).epsilon(1e-5));
+    }
     // The uploaded samples come first, in the caller's order; those of the zero-region have not moved.
     const Cloud before = cloud_of(rest);
     std::size_t unmoved = 0;

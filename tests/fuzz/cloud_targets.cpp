@@ -60,6 +60,25 @@ void try_xyz(std::span<const std::byte> bytes) {
   try_format(bytes, CloudFormat::kXyz);
 }
 
+void try_obj(std::span<const std::byte> bytes) {
+  try_format(bytes, CloudFormat::kObj);
+}
+
+void try_pcd(std::span<const std::byte> bytes) {
+  try_format(bytes, CloudFormat::kPcd);
+}
+
+void try_las(std::span<const std::byte> bytes) {
+  try_format(bytes, CloudFormat::kLas);
+  const auto read = read_cloud(bytes, CloudFormat::kLas, kParams);
+  if (!read.ok()) return;
+  const auto written = write_cloud(read.value().cloud, CloudFormat::kLas, {.grid = read.value().report.grid});
+  if (!written.ok()) return;
+  const auto again = read_cloud(written.value(), CloudFormat::kLas, kParams);
+  promise(again.ok() || again.error().code == ErrorCode::kOutOfRange, "what was written as LAS can be read");
+  promise(!again.ok() || again.value().cloud.size() == read.value().cloud.size(), "no sample is lost");
+}
+
 void try_cloud_blob(std::span<const std::byte> bytes) {
   auto blob = read_cloud_blob(bytes);
   if (!blob.ok()) return;

@@ -10,6 +10,9 @@ namespace pointwright::fuzz {
 void try_draco(std::span<const std::byte> bytes);  ///< the gate, then the decoder behind it, then finishing
 void try_ply(std::span<const std::byte> bytes);    ///< reader, finishing, and writer and reader again
 void try_xyz(std::span<const std::byte> bytes);    ///< the same
+void try_obj(std::span<const std::byte> bytes);    ///< the same
+void try_pcd(std::span<const std::byte> bytes);    ///< the same, decompression included
+void try_las(std::span<const std::byte> bytes);    ///< the same, and the writer of LAS
 void try_cloud_blob(std::span<const std::byte> bytes);  ///< the daemon's side of the confined decoder
 void try_png(std::span<const std::byte> bytes);         ///< the gate, then the decoder behind it
 void try_frame(std::span<const std::byte> bytes);       ///< the decoder of sample frames

@@ -24,6 +24,7 @@ const fenced = [
   { name: "CLI11", header: /^CLI\//, allowed: /^(server|tests)\// },
   { name: "libseccomp", header: /^seccomp\.h$/, allowed: /^(server|tests)\// },
   { name: "libpng", header: /^png\.h$/, allowed: /^(server\/ingest|tests)\// },
+  { name: "SQLite", header: /^sqlite3\.h$/, allowed: /^(server\/store|tests\/server)/ },
   { name: "OpenSSL", header: /^openssl\//, allowed: /^(server|tests)\// },
   { name: "sockets", header: /^(sys\/socket|netinet\/.*|arpa\/.*|netdb)\.h$/, allowed: /^(server|tests)\// },
   { name: "Draco", header: /^draco\//, allowed: /^(engine\/io|tests)\// },

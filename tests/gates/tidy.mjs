@@ -30,10 +30,11 @@ const checksFor = (path) => (path.startsWith("tests/") ? testChecks : sourceChec
 const cache = resolve(root, "build/checks/tidy");
 
 /**
- * The compiler's flags per source, from the release build: everything but the compiler, -o, -c, the file and the precompiled
- * headers.
+ * The compiler's flags per source, from the release build: everything but the compiler, -o, -c, the file and, unless asked
+ * for, the precompiled headers.
  */
-export async function compileFlags() {
+export async function compileFlags({ precompiled = false } = {}) {
+  const dropped = precompiled ? ["-c", "-o"] : ["-c", "-o", "-include", "-Winvalid-pch"];
   const commands = resolve(root, "build/release/compile_commands.json");
   if (!existsSync(commands)) {
     const configured = await run("cmake", ["--preset", "release"]);
@@ -49,8 +50,7 @@ export async function compileFlags() {
       .map((word) => word.replace(/\\(.)/g, "$1"));
     const kept = words.filter(
       (word, i) =>
-        !["-c", "-o", "-include", "-Winvalid-pch"].includes(word) &&
-        !["-c", "-o", "-include"].includes(words[i - 1]),
+        !dropped.includes(word) && !(dropped.includes(words[i - 1]) && words[i - 1] !== "-Winvalid-pch"),
     );
     flags.set(file.startsWith(`${root}/`) ? file.slice(root.length + 1) : file, kept);
   }

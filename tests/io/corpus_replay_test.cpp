@@ -29,6 +29,9 @@ TEST_CASE("the fuzzing corpus passes through every reader") {
   CHECK(replay("draco", fuzz::try_draco) > 0);
   CHECK(replay("ply", fuzz::try_ply) > 0);
   CHECK(replay("xyz", fuzz::try_xyz) > 0);
+  CHECK(replay("obj", fuzz::try_obj) > 0);
+  CHECK(replay("pcd", fuzz::try_pcd) > 0);
+  CHECK(replay("las", fuzz::try_las) > 0);
   CHECK(replay("cloud_blob", fuzz::try_cloud_blob) > 0);
 }
 

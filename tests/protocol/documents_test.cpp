@@ -135,6 +135,27 @@ TEST_CASE("the examples of requests pass their parsers and come back the same") 
   CHECK(parse_preview(document("preview")).value().sequence == 42);
   CHECK(parse_create_session(document("create-session")).value().name == "Wings up");
   CHECK(parse_head(document("head")).value().edit == 0);
+  CHECK(parse_session_change(document("session-change")).value().name == "arm, bent");
+  const auto import = parse_import_cloud(document("import-cloud"));
+  REQUIRE(import.ok());
+  CHECK(import.value().upload == "u7k8l9m0n1o2p-q_r3s4t5");
+  CHECK(import.value().name == "The yard");
+  CHECK(import.value().drop_non_finite);
+  CHECK(import.value().format == CloudFormat::kLas);
+}
+
+TEST_CASE("an import that names no upload, or says more or else than it may, is refused where it does") {
+  const auto fault = [](const char* text) {
+    const auto parsed = parse_import_cloud(Json::parse(text));
+    REQUIRE_FALSE(parsed.ok());
+    return parsed.errors().faults.front().pointer;
+  };
+  CHECK(fault(R"({})") == "/upload");
+  CHECK(fault(R"({"upload":"x"})") == "/upload");
+  CHECK(fault(R"({"upload":"u7k8l9m0n1o2p-q_r3s4t5","format":"laz"})") == "/format");
+  CHECK(fault(R"({"upload":"u7k8l9m0n1o2p-q_r3s4t5","nonfinite":true})") == "/nonfinite");
+  CHECK(fault(R"({"upload":"u7k8l9m0n1o2p-q_r3s4t5","name":""})") == "/name");
+  CHECK(fault(R"({"upload":"u7k8l9m0n1o2p-q_r3s4t5","more":1})") == "/more");
 }
 
 TEST_CASE("what the server sends of paintings and edits passes the parsers of requests") {

@@ -1,5 +1,6 @@
 #include <chrono>
 
+#include "protocol/json/access.h"
 #include "protocol/json/documents.h"
 #include "protocol/json/recipe.h"
 #include "tests/protocol/golden.h"
@@ -26,6 +27,11 @@ ImportReport report() {
           .position_is_double = false,
           .attributes = {"normal", "color", "quality"},
           .skipped = {"face"},
+          .normals = NormalQuality::kScaled,
+          .ranges = {{.name = "quality", .type = "float32", .min = 0.25, .max = 1.0, .non_finite = 3}},
+          .spacing = 0.0009765625,
+          .step = Vec3d(0x1.0p-26, 0x1.0p-26, 0x1.0p-25),
+          .warnings = {"2 samples are dropped: not finite", "left out: face"},
           .bounds_min = Vec3d(-0.125, -0.0625, 0.0),
           .bounds_max = Vec3d(0.125, 0.125, 0.25)};
 }
@@ -38,6 +44,16 @@ CloudDocument cloud() {
           .created = created(),
           .origin = Vec3d(0.0, 0.03125, 0.125),
           .report = report()};
+}
+
+UploadDocument upload() {
+  return {.id = "u7k8l9m0n1o2p-q_r3s4t5",
+          .name = "scan of the yard.las",
+          .media_type = "application/vnd.las",
+          .length = 8'752'000'227,
+          .offset = 33'554'432,
+          .created = created(),
+          .expires = created() + std::chrono::hours(24)};
 }
 
 ImageDocument image() {
@@ -119,7 +135,8 @@ std::vector<EditRecord> edits() {
            .moved_samples = 317000,
            .zero_samples = 120000,
            .one_samples = 9500,
-           .sample_count = 437645},
+           .sample_count = 437645,
+           .surface_hash = "3f0b7a1e5c9d2468ace013579bdf02468ace13579bdf02468ace013579bdf024"},
           {.index = 2,
            .edit = {.level = 0,
                     .deformation = Rotation{.point = Vec3d(0.0, 0.05, 0.0),
@@ -131,7 +148,8 @@ std::vector<EditRecord> edits() {
            .zero_samples = 120000,
            .one_samples = 9500,
            .inserted = 21480,
-           .sample_count = 459125}};
+           .sample_count = 459125,
+           .surface_hash = "9c1d5e3f7a2b4c6d8e0f1a3b5c7d9e0f2a4b6c8d0e1f3a5b7c9d1e3f5a7b9c0d"}};
 }
 
 /// Edits of the further kinds; edit-translation and edit-rotation are written by hand.
@@ -198,11 +216,33 @@ Problem too_large() {
           .actual = 60'000'000};
 }
 
+TimePoint expiry() {
+  using namespace std::chrono;
+  return sys_days(year(2026) / February / 28);
+}
+
+TokenDocument token() {
+  return {.id = "Y2FsbGVyLXRva2VuLWlkMA",
+          .created = created(),
+          .terms = {.name = "Ann", .scope = Scope::kEdit, .expires = expiry(), .quotas = {.sessions = 4}}};
+}
+
+ShareDocument share() {
+  return {.id = "U2hhcmUtYS12aWV3LWxpbg",
+          .created = created(),
+          .terms = {.scope = Scope::kView, .expires = expiry()}};
+}
+
 InfoDocument info() {
   return {.version = "0.1.0",
           .limits = {{"max_samples", 50'000'000}, {"max_upload_bytes", 2'147'483'648}, {"max_sessions", 16}},
           .formats = {"draco", "ply", "xyz"},
-          .features = {"preview", "stream"}};
+          .features = {"preview", "stream"},
+          .caller = to_json(CallerDocument{.token = "Y2FsbGVyLXRva2VuLWlkMA",
+                                           .name = "Ann",
+                                           .scope = Scope::kEdit,
+                                           .session = std::nullopt,
+                                           .quotas = {{"sessions", 16, 3}, {"streams", 64, 1}}})};
 }
 
 }  // namespace
@@ -211,6 +251,10 @@ std::vector<File> document_files() {
   const std::vector<std::pair<std::string, JsonDocument>> documents{
       {"cloud", to_json(cloud())},
       {"cloud-list", cloud_list({cloud()})},
+      {"upload", to_json(upload())},
+      {"upload-list", upload_list({upload()})},
+      {"import-cloud",
+       JsonDocument{{"upload", upload().id}, {"name", "The yard"}, {"nonfinite", "drop"}, {"format", "las"}}},
       {"image", to_json(image())},
       {"image-list", image_list({image()})},
       {"session-building", to_json(building())},
@@ -232,8 +276,17 @@ std::vector<File> document_files() {
       {"problem-stale", to_json(stale())},
       {"problem-limit", to_json(too_large())},
       {"info", to_json(info())},
+      {"token-list", token_list({token()})},
+      {"token-request", JsonDocument{{"name", "Ann"},
+                                     {"scope", "edit"},
+                                     {"expires", "2026-02-28T00:00:00.000Z"},
+                                     {"quotas", JsonDocument{{"sessions", 4}}}}},
+      {"share-list", share_list({share()})},
+      {"share-request", JsonDocument{{"scope", "view"}, {"expires", "2026-02-28T00:00:00.000Z"}}},
       {"event-session", session_event(ready())},
       {"event-progress", progress_event({.phase = "normals", .fraction = 0.25})},
+      {"event-presence",
+       presence_event({{.name = "Ada", .since = created()}, {.name = "", .since = created()}})},
       {"event-heartbeat", heartbeat_event()},
       {"event-end", end_event("the session was deleted")}};
   std::vector<File> files;

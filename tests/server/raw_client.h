@@ -29,6 +29,8 @@ class RawClient {
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
 
+  [[nodiscard]] int descriptor() const { return socket_; }
+
   void close() {
     if (socket_ >= 0) ::close(socket_);
     socket_ = -1;

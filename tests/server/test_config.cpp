@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
+#include <sstream>
 
 #include "server/config/config.h"
 
@@ -137,8 +138,11 @@ TEST_CASE("wrong types, numbers out of range and broken files are errors") {
 }
 
 TEST_CASE("an address beyond loopback must be asked for") {
-  CHECK(refusal(read({"--host", "0.0.0.0"})).find("--allow-remote") != std::string::npos);
-  CHECK(good(read({"--host", "0.0.0.0", "--allow-remote"})).allow_remote);
+  CHECK(refusal(read({"--host", "0.0.0.0"})).find("--tokens") != std::string::npos);
+  CHECK(refusal(read({"--host", "0.0.0.0", "--allow-remote"})).find("--tokens") != std::string::npos);
+  CHECK(refusal(read({"--host", "0.0.0.0", "--tokens", "t"})).find("--behind-proxy") != std::string::npos);
+  CHECK(good(read({"--host", "0.0.0.0", "--tokens", "t", "--allow-remote"})).allow_remote);
+  CHECK(good(read({"--host", "0.0.0.0", "--tokens", "t", "--behind-proxy"})).behind_proxy);
   CHECK(good(read({"--host", "127.0.0.2"})).host == "127.0.0.2");
   CHECK_FALSE(is_loopback("127.0.0.1.example.org"));
 }
@@ -152,6 +156,34 @@ TEST_CASE("the printed settings read back to the same settings") {
   REQUIRE(std::holds_alternative<ConfigExit>(printed));
   CHECK(std::get<ConfigExit>(printed).status == 0);
   CHECK(std::get<ConfigExit>(printed).text.find("port = 0") != std::string::npos);
+}
+
+TEST_CASE("printed settings say where each came from") {
+  const TemporaryFile file("port = 81\nweb = \"w\"\n[limits]\nmax_edits = 5\n");
+  const auto printed =
+      read({"--config", file.path(), "--port", "0", "--print-config"}, {{"POINTWRIGHT_MAX_SESSIONS", "7"}});
+  REQUIRE(std::holds_alternative<ConfigExit>(printed));
+  std::istringstream lines(std::get<ConfigExit>(printed).text);
+  std::map<std::string, std::string> by_key;
+  for (std::string line; std::getline(lines, line);) by_key[line.substr(0, line.find(' '))] = line;
+  const auto says = [&](const std::string& key, const std::string& source) {
+    return by_key[key].size() > source.size() + 2 &&
+           by_key[key].substr(by_key[key].size() - source.size() - 2) == "(" + source + ")";
+  };
+  CHECK(says("port", "--port"));
+  CHECK(says("web", file.path() + ":2"));
+  CHECK(says("max_edits", file.path() + ":4"));
+  CHECK(says("max_sessions", "POINTWRIGHT_MAX_SESSIONS"));
+  CHECK(says("host", "default"));
+}
+
+TEST_CASE("origins are taken as browsers write them") {
+  const Config config =
+      good(read({"--cors-origins", "https://App.example:443", "--cors-origins", "http://[::1]:5173"}));
+  CHECK(config.cors_origins == std::vector<std::string>{"https://app.example", "http://[::1]:5173"});
+  for (const char* text :
+       {"*", "null", "app.example", "https://", "ftp://a", "https://a/b", "https://a:0", "https://a:x"})
+    CHECK_MESSAGE(!refusal(read({"--cors-origins", text})).empty(), text);
 }
 
 TEST_CASE("help and version are printed and exit well") {

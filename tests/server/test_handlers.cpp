@@ -8,130 +8,17 @@
 #include <thread>
 
 #include "engine/io/cloud_io.h"
-#include "engine/io/decoded_cloud.h"
 #include "protocol/frames/frame.h"
 #include "protocol/frames/stream_record.h"
 #include "server/handlers/openapi.h"
 #include "server/handlers/service.h"
-#include "server/ingest/png_reader.h"
 #include "server/routes/routes.h"
-#include "tests/server/stand_in_resampler.h"
-#include "tests/server/synthetic.h"
+#include "tests/server/test_service.h"
 #include "tests/support/png_file.h"
 
 using namespace pointwright;
 using namespace pointwright::server;
-using nlohmann::json;
-
-namespace {
-
-const std::string kSphere = R"({"mode":"add","shape":{"type":"sphere","center":[0,0.5,0],"radius":0.3}})";
-const std::string kBox = R"({"mode":"add","shape":{"type":"box","min":[0.8,-1,-1],"max":[2,2,1]}})";
-const std::string kLift = R"({"level":0,"deformation":{"type":"translation","vector":[0,0,0.5]}})";
-
-struct Answer {
-  int status = 0;
-  json body;
-  std::string bytes;
-  std::vector<NameValue> headers;
-  std::string content_type;
-  [[nodiscard]] std::string header(const std::string& name) const {
-    for (const NameValue& entry : headers)
-      if (entry.first == name) return entry.second;
-    return {};
-  }
-};
-
-/// A service whose decoder runs in this process.
-struct TestService {
-  explicit TestService(Config config = {})
-      : service(std::move(config),
-                {.decode = [](std::span<const std::byte> bytes, CloudFormat format,
-                              const ImportParams& params) { return decode_cloud(bytes, format, params); },
-                 .decode_image = [](std::span<const std::byte> bytes) { return read_png(bytes, {}); },
-                 .build = build_hierarchy,
-                 .resample = test::double_every_tenth,
-                 .assets = {}}) {}
-
-  Answer ask(Method method, const std::string& target, const std::string& body = "",
-             std::vector<NameValue> headers = {}) {
-    return read(respond(method, target, body, std::move(headers)));
-  }
-  Response respond(Method method, const std::string& target, const std::string& body = "",
-                   std::vector<NameValue> headers = {}) {
-    RequestHead head{.method = method};
-    const std::size_t mark = target.find('?');
-    head.path = target.substr(0, mark);
-    if (mark != std::string::npos) {
-      std::string query = target.substr(mark + 1);
-      while (!query.empty()) {
-        const std::size_t end = std::min(query.find('&'), query.size());
-        const std::string pair = query.substr(0, end);
-        query.erase(0, end + 1);
-        const std::size_t equals = std::min(pair.find('='), pair.size());
-        head.query.emplace_back(pair.substr(0, equals), equals < pair.size() ? pair.substr(equals + 1) : "");
-      }
-    }
-    head.headers = std::move(headers);
-    head.headers.emplace_back("content-length", std::to_string(body.size()));
-    head.content_length = body.size();
-    Resolution resolution = resolve(service, head, "test-request");
-    if (auto* endpoint = std::get_if<Endpoint>(&resolution))
-      return endpoint->handle(
-          Request{.head = head, .id = "test-request", .captures = endpoint->captures, .body = body});
-    return std::move(std::get<Response>(resolution));
-  }
-  Answer get(const std::string& target, std::vector<NameValue> headers = {}) {
-    return ask(Method::kGet, target, "", std::move(headers));
-  }
-
-  std::string upload(std::size_t side = 30) {
-    const auto file = write_cloud(pointwright::test::wavy_sheet(side), CloudFormat::kPly, {});
-    REQUIRE(file.ok());
-    const Answer answer =
-        ask(Method::kPost, "/v1/clouds?name=sheet",
-            std::string(reinterpret_cast<const char*>(file.value().data()), file.value().size()),
-            {{"content-type", "application/octet-stream"}});
-    REQUIRE(answer.status == 201);
-    return answer.body["id"];
-  }
-  /// The path of a session that is ready, on a cloud of its own.
-  std::string open_session() {
-    const std::string cloud = upload();
-    const Answer made = ask(Method::kPost, "/v1/sessions", R"({"cloud":")" + cloud + R"(","scales":[0.05]})");
-    REQUIRE(made.status == 202);
-    const std::string path = made.header("Location");
-    for (int i = 0; i < 5000 && get(path).body["state"] == "building"; ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    REQUIRE(get(path).body["state"] == "ready");
-    return path;
-  }
-  std::string open_painted() {
-    const std::string path = open_session();
-    REQUIRE(ask(Method::kPost, path + "/regions/zero/operations", kSphere).status == 200);
-    REQUIRE(ask(Method::kPost, path + "/regions/one/operations", kBox).status == 200);
-    return path;
-  }
-
-  Service service;
-
- private:
-  static Answer read(Response response) {
-    Answer answer{
-        .status = response.status, .headers = response.headers, .content_type = response.content_type};
-    if (auto* text = std::get_if<std::string>(&response.body)) answer.bytes = std::move(*text);
-    if (auto* shared = std::get_if<SharedBytes>(&response.body))
-      answer.bytes.assign(reinterpret_cast<const char*>(shared->bytes.data()), shared->bytes.size());
-    if (answer.content_type.find("json") != std::string::npos) answer.body = json::parse(answer.bytes);
-    return answer;
-  }
-};
-
-std::vector<NameValue> if_match(const std::string& tag) {
-  return {{"if-match", tag}};
-}
-
-}  // namespace
+using namespace pointwright::test;
 
 TEST_CASE("every route is in the API's description, and everything described has a route") {
   const json openapi = json::parse(openapi_json());
@@ -139,8 +26,13 @@ TEST_CASE("every route is in the API's description, and everything described has
   std::set<std::string> described;
   for (const auto& [path, operations] : openapi["paths"].items()) {
     if (path == "/assets/{file}") continue;  // answered from the table of files
+    if (path == "/docs/{file}") {
+      described.insert("get /docs/docs.css");
+      described.insert("get /docs/docs.js");
+      continue;
+    }
     std::string pattern = path;
-    for (const char* name : {"{cloud}", "{image}", "{session}"})
+    for (const char* name : {"{cloud}", "{image}", "{session}", "{share}", "{token}", "{upload}"})
       if (const std::size_t at = pattern.find(name); at != std::string::npos)
         pattern.replace(at, std::strlen(name), "{id}");
     for (const auto& [method, operation] : operations.items())
@@ -443,7 +335,8 @@ TEST_CASE("samples come in every format, with tags that change with the revision
   CHECK(test.get(path + "/samples?level=2").status == 422);
   CHECK(test.get(path + "/samples?level=x").status == 422);
   CHECK(test.get(path + "/samples?format=frame&attributes=smell").status == 422);
-  CHECK(test.get(path + "/samples?attributes=normal").status == 422);
+  CHECK(test.get(path + "/samples?attributes=smell").status == 422);
+  CHECK(test.get(path + "/samples?attributes=normal").status == 200);
 }
 
 TEST_CASE("a budget grants what is left, and to who asks alone even more") {
@@ -545,17 +438,33 @@ TEST_CASE("streams begin with the session and a key frame, and end with a word")
     records.push_back(*next.value());
   }
   CHECK(parser.at_record_end());
-  REQUIRE(records.size() >= 3);
+  REQUIRE(records.size() >= 4);
   const auto event = [](const protocol::StreamRecord& record) {
     return json::parse(reinterpret_cast<const char*>(record.payload.data()),
                        reinterpret_cast<const char*>(record.payload.data()) + record.payload.size());
   };
   CHECK(event(records.front())["event"] == "session");
-  CHECK(records[1].type == 1);
-  const auto frame = protocol::decode_frame(records[1].payload);
+  CHECK(event(records[1])["event"] == "presence");
+  CHECK(records[2].type == 1);
+  const auto frame = protocol::decode_frame(records[2].payload);
   REQUIRE(frame.ok());
   CHECK(frame.value().header.kind == protocol::FrameKind::kKey);
   CHECK(event(records.back())["event"] == "end");
+}
+
+TEST_CASE("what is not known yet does not read as missing while the server starts") {
+  TestService test;
+  const std::string path = test.open_session();
+  test.service.is_ready = false;
+  for (const char* asked :
+       {"/v1/sessions/AAAAAAAAAAAAAAAAAAAAAA", "/v1/clouds/AAAAAAAAAAAAAAAAAAAAAA", "/v1/info"})
+    CHECK(test.get(asked).status == 503);
+  CHECK(test.get(path).status == 503);
+  CHECK(test.get("/healthz").status == 200);
+  CHECK(test.get("/readyz").status == 503);
+  test.service.is_ready = true;
+  CHECK(test.get(path).status == 200);
+  CHECK(test.get("/v1/sessions/AAAAAAAAAAAAAAAAAAAAAA").status == 404);
 }
 
 TEST_CASE("no more streams than the limit says") {

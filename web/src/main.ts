@@ -1,5 +1,6 @@
 import { ApiClient } from "./api/client";
 import { problemOf } from "./api/problem";
+import { bearer, keepBearer, takeCapability } from "./api/token";
 import type { SessionDocument } from "./api/types";
 import type { Notices, Questions } from "./event-map";
 import { Events } from "./events";
@@ -17,15 +18,20 @@ const NO_CAMERA = { position: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] } as c
 async function main(): Promise<void> {
   const root = document.getElementById("app");
   if (!root) throw new Error("the page has no place for the viewer");
-  const client = new ApiClient(new URL("./", location.href).href);
+  const { href, capability } = takeCapability(location.href);
+  if (href !== location.href) history.replaceState(null, "", href);
+  if (capability !== null) keepBearer(capability);
+  const client = new ApiClient(new URL("./", location.href).href, undefined, bearer);
   const link = readLink(location.search, location.hash);
   const bare: ViewerStatus = { state: "home", loadedSamples: 0, revision: 0, lastSequence: 0, idle: true };
   if (link.session === null) {
     installHook(() => bare, { get: () => NO_CAMERA, set: () => undefined });
     try {
       const { showHome } = await import("./ui/home");
+      await client.info();
       await showHome(root, client);
     } catch (error) {
+      if (await asksForToken(root, error)) return;
       const failure = createProgress();
       root.append(failure.element);
       failure.fail(problemOf(error));
@@ -45,7 +51,7 @@ async function main(): Promise<void> {
     session = await whenReady(client, link.session, progress.show);
   } catch (error) {
     state = "failed";
-    progress.fail(problemOf(error));
+    if (!(await asksForToken(progress.element, error))) progress.fail(problemOf(error));
     return;
   }
   if (session.state === "failed") {
@@ -79,6 +85,16 @@ async function main(): Promise<void> {
     state = "failed";
     progress.fail({ ...problemOf(error), title: "This browser cannot draw the surface" });
   }
+}
+
+/** Whether the server refused for want of a token: then the place has a field for one. */
+async function asksForToken(place: HTMLElement, error: unknown): Promise<boolean> {
+  const { status, detail, title } = problemOf(error);
+  if (status !== 401) return false;
+  const { createTokenField } = await import("./ui/token-field");
+  place.replaceChildren(createTokenField(detail ?? title));
+  place.hidden = false;
+  return true;
 }
 
 /** A camera in other coordinates that differ by a translation. */

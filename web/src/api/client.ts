@@ -6,12 +6,14 @@ import type {
   ExportFormat,
   History,
   ImageDocument,
+  NewShare,
   RecordedOperation,
   RegionName,
   RegionOperation,
   ServiceInfo,
   SessionDocument,
   SessionSummary,
+  Share,
 } from "./types";
 
 export type Fetch = (input: string, init?: RequestInit) => Promise<Response>;
@@ -31,9 +33,16 @@ function retryAfter(response: Response): number | undefined {
 export class ApiClient {
   private readonly base_: string;
   private readonly fetch_: Fetch;
+  /** The token that requests carry; null for none. */
+  readonly token: () => string | null;
 
   /** `base` is the directory that the viewer was served from, with its slash. */
-  constructor(base: string, fetch: Fetch = (input, init) => globalThis.fetch(input, init)) {
+  constructor(
+    base: string,
+    fetch: Fetch = (input, init) => globalThis.fetch(input, init),
+    token: () => string | null = () => null,
+  ) {
+    this.token = token;
     this.base_ = base.endsWith("/") ? base : `${base}/`;
     this.fetch_ = fetch;
   }
@@ -44,8 +53,14 @@ export class ApiClient {
 
   async request(path: string, init: RequestInit = {}): Promise<Response> {
     let response: Response;
+    const token = this.token();
+    const headers = token === null ? init.headers : { ...init.headers, Authorization: `Bearer ${token}` };
     try {
-      response = await this.fetch_(this.url(path), { cache: "no-store", ...init });
+      response = await this.fetch_(this.url(path), {
+        cache: "no-store",
+        ...init,
+        ...(headers === undefined ? {} : { headers }),
+      });
     } catch (error) {
       if (error instanceof DOMException && error.name === "AbortError") throw error;
       throw new ApiError(networkProblem(error instanceof Error ? error.message : String(error)));
@@ -146,6 +161,24 @@ export class ApiClient {
 
   putHead(id: string, edit: number, revision: number): Promise<SessionDocument> {
     return this.send("PUT", `v1/sessions/${id}/head`, { edit }, { "If-Match": `"r${revision}"` });
+  }
+
+  async shares(id: string): Promise<Share[]> {
+    return (await this.json<{ shares: Share[] }>(`v1/sessions/${id}/shares`)).shares;
+  }
+
+  /** A link to the session; its capability is told this once. */
+  createShare(id: string, scope: "view" | "edit"): Promise<NewShare> {
+    return this.send("POST", `v1/sessions/${id}/shares`, { scope });
+  }
+
+  async revokeShare(id: string, share: string): Promise<void> {
+    await this.request(`v1/sessions/${id}/shares/${share}`, { method: "DELETE" });
+  }
+
+  /** A file of the server's: what its URL names, with the token that a link cannot carry. */
+  async file(url: string): Promise<Blob> {
+    return (await this.request(url.slice(this.base_.length))).blob();
   }
 
   exportUrl(id: string, format: ExportFormat): string {

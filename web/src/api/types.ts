@@ -53,6 +53,8 @@ export interface ImageShape {
 export type ImageChannel = "luminance" | "red" | "green" | "blue" | "alpha";
 
 export type ImageDocument = Schemas["Image"];
+export type Share = Schemas["ShareMembers"];
+export type NewShare = Schemas["NewShare"];
 
 /** What is within a distance of another cloud, placed by a matrix (row after row). */
 export interface ModelShape {

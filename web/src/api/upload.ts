@@ -1,3 +1,4 @@
+import type { ApiClient } from "./client";
 import { ApiError, networkProblem, problemFromBody } from "./problem";
 import type { CloudDocument } from "./types";
 
@@ -7,18 +8,36 @@ export function mediaTypeOf(name: string): string {
   if (extension === "drc") return "model/x-draco";
   if (extension === "ply") return "application/x-ply";
   if (extension === "xyz" || extension === "txt" || extension === "asc") return "text/plain";
+  if (extension === "las") return "application/vnd.las";
+  if (extension === "pcd") return "model/x-pcd";
+  if (extension === "obj") return "model/obj";
   return "application/octet-stream";
 }
+
+/** Longer files go in pieces, which a broken connection does not undo. */
+const LONG_BYTES = 32 << 20;
 
 export interface UploadOptions {
   /** Keep the rest where some samples are not finite, instead of refusing the file. */
   dropNonFinite?: boolean;
+  token?: string | null;
   signal?: AbortSignal;
   onProgress?: (fraction: number) => void;
 }
 
-/** Sends a file as a new cloud. XMLHttpRequest, since fetch tells no upload progress. */
-export function uploadCloud(base: string, file: File, options: UploadOptions = {}): Promise<CloudDocument> {
+/** Sends a file as a new cloud. */
+export async function uploadCloud(
+  client: ApiClient,
+  file: File,
+  options: UploadOptions = {},
+): Promise<CloudDocument> {
+  if (file.size <= LONG_BYTES) return uploadWhole(client.url(""), file, options);
+  const { uploadInPieces } = await import("./tus");
+  return uploadInPieces(client, file, options);
+}
+
+/** In one request. XMLHttpRequest, since fetch tells no upload progress. */
+function uploadWhole(base: string, file: File, options: UploadOptions): Promise<CloudDocument> {
   const query = new URLSearchParams({ name: file.name });
   if (options.dropNonFinite) query.set("nonfinite", "drop");
   return new Promise((resolve, reject) => {
@@ -26,6 +45,7 @@ export function uploadCloud(base: string, file: File, options: UploadOptions = {
     request.open("POST", `${base}v1/clouds?${query}`);
     request.setRequestHeader("Content-Type", mediaTypeOf(file.name));
     request.setRequestHeader("Accept", "application/json");
+    if (options.token) request.setRequestHeader("Authorization", `Bearer ${options.token}`);
     request.upload.onprogress = (event) => {
       if (event.lengthComputable) options.onProgress?.(event.loaded / event.total);
     };

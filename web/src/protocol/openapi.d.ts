@@ -123,6 +123,57 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/metrics": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Counters, gauges and histograms as Prometheus reads them; not for share links */
+        get: operations["getMetrics"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/docs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** This document as a page to read */
+        get: operations["getDocs"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/docs/{file}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The style (docs.css) or the script (docs.js) of that page */
+        get: operations["getDocsFile"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/info": {
         parameters: {
             query?: never;
@@ -135,6 +186,43 @@ export interface paths {
         put?: never;
         post?: never;
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/tokens": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** All tokens, without their secrets */
+        get: operations["listTokens"];
+        put?: never;
+        /** A new token; its secret is told this once */
+        post: operations["createToken"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/tokens/{token}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                token: components["parameters"]["TokenId"];
+            };
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /** Ends a token, and the links that came from it */
+        delete: operations["revokeToken"];
         options?: never;
         head?: never;
         patch?: never;
@@ -154,7 +242,8 @@ export interface paths {
          * Upload a cloud
          * @description The body is the file. Of a mesh the vertices are taken. Samples that are not finite are refused with their number
          *     unless `nonfinite=drop`; duplicates are kept and counted. Coordinates beyond 1e9, and an extent too small for its
-         *     distance from zero, are refused. The document's `report` says what was found.
+         *     distance from zero, are refused. The document's `report` says what was found. A JSON body names a complete
+         *     resumable upload instead, without a query; it is removed where the import succeeds, and kept where it does not.
          */
         post: operations["uploadCloud"];
         delete?: never;
@@ -192,7 +281,7 @@ export interface paths {
             };
             cookie?: never;
         };
-        /** The cloud as a file, in the caller's order, with all its attributes */
+        /** The cloud as a file, in the caller's order, with all its attributes or those that are asked for */
         get: operations["getCloudData"];
         put?: never;
         post?: never;
@@ -200,6 +289,53 @@ export interface paths {
         options?: never;
         head?: never;
         patch?: never;
+        trace?: never;
+    };
+    "/v1/uploads": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** All resumable uploads */
+        get: operations["listUploads"];
+        put?: never;
+        /**
+         * Begin a resumable upload (tus 1.0.0)
+         * @description Creation, creation with upload, checksum, termination and expiration of the tus protocol; OPTIONS says so in headers.
+         *     The bytes go to the disk, and an offset is told only once they are there. Import a complete upload with
+         *     `POST /v1/clouds`. What is not imported is removed upload_expiry_s after its last byte.
+         */
+        post: operations["createUpload"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/uploads/{upload}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                upload: components["parameters"]["UploadId"];
+            };
+            cookie?: never;
+        };
+        /**
+         * How far an upload is
+         * @description HEAD answers with the headers alone, and needs Tus-Resumable.
+         */
+        get: operations["getUpload"];
+        put?: never;
+        post?: never;
+        /** Give an upload up */
+        delete: operations["deleteUpload"];
+        options?: never;
+        head?: never;
+        /** Send the next bytes */
+        patch: operations["continueUpload"];
         trace?: never;
     };
     "/v1/images": {
@@ -278,7 +414,7 @@ export interface paths {
         put?: never;
         /**
          * Open a session on a cloud
-         * @description Building takes a while; the state goes from `building` to `ready` or `failed`.
+         * @description Building takes a while; the state goes from `building` to `ready` or `failed`. Where the server keeps sessions (`--data`), one that nobody uses may fall `asleep`, as all do over a restart: lists say so, and the first request that needs it brings it back as it was, revision, edits and ids included. That request waits a few seconds (`wake_wait_ms`); the state is `building` meanwhile. What does not come back to the bit is not served: `damaged`.
          */
         post: operations["createSession"];
         delete?: never;
@@ -302,6 +438,52 @@ export interface paths {
         post?: never;
         /** Delete a session; one that is being built is cancelled */
         delete: operations["deleteSession"];
+        options?: never;
+        head?: never;
+        /** Rename a session */
+        patch: operations["changeSession"];
+        trace?: never;
+    };
+    "/v1/sessions/{session}/shares": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        /** The links to this session, without their capabilities */
+        get: operations["listShares"];
+        put?: never;
+        /**
+         * A link that opens this session to whoever has it
+         * @description The capability is told this once. It belongs into the fragment of the viewer's address, which browsers never send
+         *     (`/?session=<id>#k=<capability>` or `/#s=<id>&k=<capability>`), and into `Authorization: Bearer`. It gives no more
+         *     than the token that it came from has at the time, and ends with it.
+         */
+        post: operations["createShare"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/sessions/{session}/shares/{share}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+                share: components["parameters"]["ShareId"];
+            };
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /** Ends a link */
+        delete: operations["revokeShare"];
         options?: never;
         head?: never;
         patch?: never;
@@ -398,6 +580,34 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sessions/{session}/edits/{edit}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+                /** @description The number of an edit in the history; the first one has 1 */
+                edit: components["parameters"]["EditIndex"];
+            };
+            cookie?: never;
+        };
+        /** One edit of the history */
+        get: operations["getEdit"];
+        /**
+         * Put another edit in the place of an old one, and make the rest once more
+         * @description The edits after it, those undone included, are made anew, each with the painting that it was made with: all or none,
+         *     as one change. The head stays with its edit. Samples that resampling inserted from this edit on are others afterwards;
+         *     paintings pass to them from their parents. The session may be used meanwhile, but a change to it refuses this one (412).
+         */
+        put: operations["amendEdit"];
+        post?: never;
+        /** Take an old edit out of the history, and make the rest once more */
+        delete: operations["removeEdit"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sessions/{session}/head": {
         parameters: {
             query?: never;
@@ -483,9 +693,33 @@ export interface paths {
         /**
          * Frames and events for as long as the client stays
          * @description Records of u32 type, u32 length and payload, little-endian. Type 1 is a sample frame, the first one a key frame;
-         *     type 2 a JSON event in UTF-8 (schema `StreamEvent`). Receivers skip types that they do not know.
+         *     type 2 a JSON event in UTF-8 (schema `StreamEvent`). Receivers skip types that they do not know. Whoever comes again
+         *     after a break gets a key frame and goes on from there.
          */
         get: operations["stream"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/sessions/{session}/events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        /**
+         * The events of the stream alone, as server-sent events
+         * @description Each event's data is a `StreamEvent`, its id the revision that the receiver then knows: with it in Last-Event-ID, a
+         *     receiver that comes again is told of the session only where that has changed. Heartbeats are comments.
+         */
+        get: operations["events"];
         put?: never;
         post?: never;
         delete?: never;
@@ -529,11 +763,85 @@ export interface components {
             };
             formats: string[];
             features: string[];
+            caller: components["schemas"]["Caller"];
+        };
+        /**
+         * @description Each holds those before it
+         * @enum {string}
+         */
+        Scope: "view" | "edit" | "admin";
+        /** @description Who asks, as the server knows it */
+        Caller: {
+            scope: components["schemas"]["Scope"];
+            /** @description The token, or the one that a share link came from */
+            token?: components["schemas"]["Id"];
+            /** @description Of the token */
+            name?: string;
+            /** @description The only session that a share link opens */
+            session?: components["schemas"]["Id"];
+            /** @description What bounds this token, by name, and how much of it is used; nothing where no tokens are in use */
+            quotas: {
+                [key: string]: {
+                    limit: components["schemas"]["Count"];
+                    used: components["schemas"]["Count"];
+                };
+            };
+        };
+        /** @description What one token may have; the server's own limits (token_…) where a member is absent */
+        Quotas: {
+            sessions?: components["schemas"]["Count"];
+            /** @description Of all sessions together, as they begin */
+            samples?: components["schemas"]["Count"];
+            /** @description Of uploads that are kept */
+            stored_bytes?: components["schemas"]["Count"];
+            upload_bytes_per_day?: components["schemas"]["Count"];
+            streams?: components["schemas"]["Count"];
+            requests_per_second?: components["schemas"]["Count"];
+        };
+        TokenRequest: {
+            name: components["schemas"]["Name"];
+            scope: components["schemas"]["Scope"];
+            expires?: components["schemas"]["Time"];
+            quotas?: components["schemas"]["Quotas"];
+        };
+        TokenMembers: {
+            id: components["schemas"]["Id"];
+            name: components["schemas"]["Name"];
+            scope: components["schemas"]["Scope"];
+            created: components["schemas"]["Time"];
+            expires?: components["schemas"]["Time"];
+            quotas: components["schemas"]["Quotas"];
+        };
+        NewToken: components["schemas"]["TokenMembers"] & {
+            /** @description The token itself; kept nowhere */
+            secret: string;
+        };
+        TokenList: {
+            tokens: components["schemas"]["TokenMembers"][];
+        };
+        ShareRequest: {
+            /** @enum {string} */
+            scope: "view" | "edit";
+            expires?: components["schemas"]["Time"];
+        };
+        ShareMembers: {
+            id: components["schemas"]["Id"];
+            /** @enum {string} */
+            scope: "view" | "edit";
+            created: components["schemas"]["Time"];
+            expires?: components["schemas"]["Time"];
+        };
+        NewShare: components["schemas"]["ShareMembers"] & {
+            /** @description What the link carries; kept nowhere */
+            capability: string;
+        };
+        ShareList: {
+            shares: components["schemas"]["ShareMembers"][];
         };
         /** @description What was found in an upload */
         ImportReport: {
             /** @enum {string} */
-            format: "draco" | "ply" | "xyz";
+            format: "draco" | "ply" | "xyz" | "obj" | "pcd" | "las";
             /** @description As the format calls it, like binary_little_endian */
             encoding: string;
             /** @description What the file's header claims */
@@ -547,6 +855,61 @@ export interface components {
             attributes: string[];
             /** @description Elements and properties that were left out */
             skipped: string[];
+            /**
+             * @description scaled: they were not of unit length, and are now
+             * @enum {string}
+             */
+            normals: "none" | "unit" | "scaled";
+            scalars: components["schemas"]["ScalarRange"][];
+            /** @description Median distance to the nearest other sample, of up to 4096 of them */
+            spacing: number;
+            /** @description By axis, the smallest step that the positions in the file make where they are coarsest */
+            step: components["schemas"]["Vector"];
+            /** @enum {string} */
+            verdict: "ok" | "warnings";
+            /** @description Sentences for a person */
+            warnings: string[];
+        };
+        /** @description One scalar of a cloud; min and max are null where none of its values is finite */
+        ScalarRange: {
+            name: string;
+            /** @enum {string} */
+            type: "int8" | "uint8" | "int16" | "uint16" | "int32" | "uint32" | "float32" | "float64";
+            min: number | null;
+            max: number | null;
+            non_finite: components["schemas"]["Count"];
+        };
+        /** @description A cloud from a resumable upload */
+        ImportCloud: {
+            upload: components["schemas"]["Id"];
+            /** @description Absent: the upload's */
+            name?: components["schemas"]["Name"];
+            /**
+             * @default reject
+             * @enum {string}
+             */
+            nonfinite: "reject" | "drop";
+            /**
+             * @description Absent: found out
+             * @enum {string}
+             */
+            format?: "draco" | "ply" | "xyz" | "obj" | "pcd" | "las";
+        };
+        /** @description A resumable upload */
+        Upload: {
+            id: components["schemas"]["Id"];
+            /** @description Of the file, as the client calls it; may be empty */
+            name: string;
+            media_type: string;
+            /** @description Bytes in the end */
+            length: components["schemas"]["Count"];
+            /** @description Bytes that are on the disk */
+            offset: components["schemas"]["Count"];
+            created: components["schemas"]["Time"];
+            expires: components["schemas"]["Time"];
+        };
+        UploadList: {
+            uploads: components["schemas"]["Upload"][];
         };
         Cloud: {
             id: components["schemas"]["Id"];
@@ -622,7 +985,7 @@ export interface components {
             operations: components["schemas"]["Count"];
         };
         /** @enum {string} */
-        SessionState: "building" | "ready" | "failed";
+        SessionState: "building" | "ready" | "failed" | "asleep";
         SessionSummary: {
             id: components["schemas"]["Id"];
             name: string;
@@ -1013,10 +1376,15 @@ export interface components {
             removed: components["schemas"]["Count"];
             /** @description Of the surface after the edit */
             sample_count: components["schemas"]["Count"];
+            /** @description Of the positions, normals and ids of the samples after the edit, to the bit: equal for equal surfaces. After a restart a session is served only where its edits lead to these hashes once more. */
+            surface_hash: string;
         };
         EditList: {
             head: components["schemas"]["Count"];
             edits: components["schemas"]["EditRecord"][];
+        };
+        SessionChange: {
+            name: string;
         };
         Head: {
             /** @description How many edits stay applied; 0: none */
@@ -1049,7 +1417,7 @@ export interface components {
             timing?: components["schemas"]["Timing"];
         };
         /** @description The payload of a stream record of type 2; its event may be one that a receiver does not know */
-        StreamEvent: components["schemas"]["SessionEvent"] | components["schemas"]["ProgressEvent"] | components["schemas"]["HeartbeatEvent"] | components["schemas"]["EndEvent"];
+        StreamEvent: components["schemas"]["SessionEvent"] | components["schemas"]["ProgressEvent"] | components["schemas"]["PresenceEvent"] | components["schemas"]["HeartbeatEvent"] | components["schemas"]["EndEvent"];
         /** @description The members of the session document, beside the event's own */
         SessionEvent: {
             /** @constant */
@@ -1060,6 +1428,16 @@ export interface components {
             event: "progress";
             phase: string;
             fraction: number;
+        };
+        /** @description Who looks at the session, in the order in which they came; the receiver is one of them */
+        PresenceEvent: {
+            /** @constant */
+            event: "presence";
+            viewers: {
+                /** @description As the viewer gave it; may be empty */
+                name: string;
+                since: components["schemas"]["Time"];
+            }[];
         };
         HeartbeatEvent: {
             /** @constant */
@@ -1073,7 +1451,7 @@ export interface components {
         /** @description RFC 9457 */
         Problem: {
             /** @enum {string} */
-            type: "/problems/malformed-request" | "/problems/malformed-json" | "/problems/empty-body" | "/problems/invalid-value" | "/problems/host-not-allowed" | "/problems/origin-not-allowed" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/not-acceptable" | "/problems/request-timeout" | "/problems/wrong-state" | "/problems/cloud-in-use" | "/problems/length-required" | "/problems/stale-revision" | "/problems/body-too-large" | "/problems/path-too-long" | "/problems/unsupported-media-type" | "/problems/range-not-satisfiable" | "/problems/expectation-failed" | "/problems/revision-required" | "/problems/too-many" | "/problems/head-too-large" | "/problems/internal-error" | "/problems/not-implemented" | "/problems/overloaded" | "/problems/http-version-not-supported" | "/problems/out-of-space" | "/problems/malformed-cloud" | "/problems/unsupported-format" | "/problems/non-finite" | "/problems/out-of-range" | "/problems/limit-exceeded" | "/problems/empty-cloud" | "/problems/empty-region" | "/problems/regions-intersect" | "/problems/cancelled";
+            type: "/problems/malformed-request" | "/problems/malformed-json" | "/problems/empty-body" | "/problems/invalid-value" | "/problems/host-not-allowed" | "/problems/origin-not-allowed" | "/problems/unauthorized" | "/problems/forbidden" | "/problems/not-found" | "/problems/method-not-allowed" | "/problems/not-acceptable" | "/problems/request-timeout" | "/problems/wrong-state" | "/problems/cloud-in-use" | "/problems/upload-offset" | "/problems/upload-locked" | "/problems/tus-version" | "/problems/checksum-mismatch" | "/problems/length-required" | "/problems/stale-revision" | "/problems/body-too-large" | "/problems/path-too-long" | "/problems/unsupported-media-type" | "/problems/range-not-satisfiable" | "/problems/expectation-failed" | "/problems/revision-required" | "/problems/too-many" | "/problems/head-too-large" | "/problems/internal-error" | "/problems/not-implemented" | "/problems/overloaded" | "/problems/http-version-not-supported" | "/problems/out-of-space" | "/problems/malformed-cloud" | "/problems/unsupported-format" | "/problems/non-finite" | "/problems/out-of-range" | "/problems/limit-exceeded" | "/problems/empty-cloud" | "/problems/empty-region" | "/problems/regions-intersect" | "/problems/out-of-disk" | "/problems/storage-failed" | "/problems/damaged" | "/problems/key-in-use" | "/problems/key-reused" | "/problems/cancelled";
             title: string;
             status: number;
             detail: string;
@@ -1155,25 +1533,53 @@ export interface components {
                 "application/x-ply": string;
                 "model/x-draco": string;
                 "text/plain": string;
+                "application/vnd.las": string;
             };
         };
     };
     parameters: {
         CloudId: components["schemas"]["Id"];
         ImageId: components["schemas"]["Id"];
+        TokenId: components["schemas"]["Id"];
+        ShareId: components["schemas"]["Id"];
         SessionId: components["schemas"]["Id"];
         /** @description zero stays where it is, one moves in full */
         Region: "zero" | "one";
+        /** @description The number of an edit in the history; the first one has 1 */
+        EditIndex: number;
+        /** @description The name that others see while the stream is open */
+        ViewerName: string;
+        /** @description The revision that the change is made for, as the session's ETag says it; or * for any */
+        OwedIfMatch: string;
         /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
         IfMatch: string;
+        /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+        IdempotencyKey: string;
         IfNoneMatch: string;
-        /** @description What a frame carries beside the positions, as far as the cloud has it */
-        Attributes: ("normal" | "t" | "detail" | "color" | "marks" | "ids" | "radius")[];
+        /**
+         * @description What a frame carries beside the positions, as far as the cloud has it: normal (which it has unless told otherwise), t,
+         *     detail, color, marks, ids, radius. Of a file, as of a cloud's: what it keeps; all of the cloud's where this is absent.
+         *     detail is a scalar of its own there, and comes where it is named; so are stretch and minor_stretch (the principal
+         *     stretches of each sample's cell, factors), anisotropy (their quotient) and area_change (their product).
+         */
+        Attributes: string[];
+        /** @description What the file keeps beside the positions: normal, color, texcoord, and scalars by name. Absent: all. */
+        FileAttributes: string[];
+        /** @description Of a PLY file */
+        Encoding: "binary" | "ascii";
+        UploadId: components["schemas"]["Id"];
+        TusResumable: "1.0.0";
+        /** @description sha256 or sha1, a blank, and the digest of this body in base64 */
+        UploadChecksum: string;
         /** @description What the frames carry beside the positions, as far as the cloud has it */
         StreamAttributes: ("normal" | "t" | "detail" | "color" | "marks" | "radius")[];
     };
     requestBodies: never;
     headers: {
+        /** @description Bytes of the upload that are on the disk */
+        UploadOffset: components["schemas"]["Count"];
+        /** @description When the upload is removed unless more of it comes */
+        UploadExpires: string;
         /** @description Names this request in the server's log */
         RequestId: string;
         /** @description Of a session `"r<revision>"` */
@@ -1349,6 +1755,75 @@ export interface operations {
             default: components["responses"]["Problem"];
         };
     };
+    getMetrics: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Text of the exposition format 0.0.4 */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": string;
+                };
+            };
+            default: components["responses"]["Problem"];
+        };
+    };
+    getDocs: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The page; it needs no other server */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": string;
+                };
+            };
+            default: components["responses"]["Problem"];
+        };
+    };
+    getDocsFile: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                file: "docs.css" | "docs.js";
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The file */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/css": string;
+                    "text/javascript": string;
+                };
+            };
+            default: components["responses"]["Problem"];
+        };
+    };
     getInfo: {
         parameters: {
             query?: never;
@@ -1368,6 +1843,77 @@ export interface operations {
                     "application/json": components["schemas"]["Info"];
                 };
             };
+            default: components["responses"]["Problem"];
+        };
+    };
+    listTokens: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The tokens */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TokenList"];
+                };
+            };
+            default: components["responses"]["Problem"];
+        };
+    };
+    createToken: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TokenRequest"];
+            };
+        };
+        responses: {
+            /** @description The token */
+            201: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    Location: components["headers"]["Location"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NewToken"];
+                };
+            };
+            400: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    revokeToken: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                token: components["parameters"]["TokenId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            204: components["responses"]["Done"];
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1400,7 +1946,10 @@ export interface operations {
                 /** @description What to do with samples that are not finite */
                 nonfinite?: "drop" | "reject";
             };
-            header?: never;
+            header?: {
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
+            };
             path?: never;
             cookie?: never;
         };
@@ -1408,8 +1957,12 @@ export interface operations {
             content: {
                 "model/x-draco": string;
                 "application/x-ply": string;
+                "application/vnd.las": string;
+                "model/x-pcd": string;
+                "model/obj": string;
                 "text/plain": string;
                 "application/octet-stream": string;
+                "application/json": components["schemas"]["ImportCloud"];
             };
         };
         responses: {
@@ -1427,10 +1980,12 @@ export interface operations {
             };
             400: components["responses"]["Problem"];
             408: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
             411: components["responses"]["Problem"];
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
+            423: components["responses"]["Busy"];
             429: components["responses"]["Busy"];
             503: components["responses"]["Busy"];
             507: components["responses"]["Busy"];
@@ -1480,6 +2035,8 @@ export interface operations {
             204: components["responses"]["Done"];
             404: components["responses"]["Problem"];
             409: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1487,7 +2044,11 @@ export interface operations {
         parameters: {
             query?: {
                 /** @description Instead of the Accept header */
-                format?: "ply" | "draco" | "xyz";
+                format?: "ply" | "draco" | "xyz" | "las";
+                /** @description What the file keeps beside the positions: normal, color, texcoord, and scalars by name. Absent: all. */
+                attributes?: components["parameters"]["FileAttributes"];
+                /** @description Of a PLY file */
+                encoding?: components["parameters"]["Encoding"];
             };
             header?: {
                 "If-None-Match"?: components["parameters"]["IfNoneMatch"];
@@ -1504,6 +2065,166 @@ export interface operations {
             404: components["responses"]["Problem"];
             406: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    listUploads: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The uploads */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UploadList"];
+                };
+            };
+            default: components["responses"]["Problem"];
+        };
+    };
+    createUpload: {
+        parameters: {
+            query?: never;
+            header: {
+                "Tus-Resumable": components["parameters"]["TusResumable"];
+                "Upload-Length": components["schemas"]["Count"];
+                /** @description A list of: key, blank, base64. filename and filetype are understood */
+                "Upload-Metadata"?: string;
+                /** @description sha256 or sha1, a blank, and the digest of this body in base64 */
+                "Upload-Checksum"?: components["parameters"]["UploadChecksum"];
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/offset+octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Begun */
+            201: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    Location: components["headers"]["Location"];
+                    "Upload-Offset": components["headers"]["UploadOffset"];
+                    "Upload-Expires": components["headers"]["UploadExpires"];
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            400: components["responses"]["Problem"];
+            408: components["responses"]["Problem"];
+            411: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            429: components["responses"]["Busy"];
+            460: components["responses"]["Problem"];
+            507: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    getUpload: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                upload: components["parameters"]["UploadId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The upload */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    "Upload-Offset": components["headers"]["UploadOffset"];
+                    "Upload-Expires": components["headers"]["UploadExpires"];
+                    "Upload-Length"?: components["schemas"]["Count"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Upload"];
+                };
+            };
+            404: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    deleteUpload: {
+        parameters: {
+            query?: never;
+            header: {
+                "Tus-Resumable": components["parameters"]["TusResumable"];
+            };
+            path: {
+                upload: components["parameters"]["UploadId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            204: components["responses"]["Done"];
+            404: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
+            423: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    continueUpload: {
+        parameters: {
+            query?: never;
+            header: {
+                "Tus-Resumable": components["parameters"]["TusResumable"];
+                "Upload-Offset": components["schemas"]["Count"];
+                /** @description sha256 or sha1, a blank, and the digest of this body in base64 */
+                "Upload-Checksum"?: components["parameters"]["UploadChecksum"];
+            };
+            path: {
+                upload: components["parameters"]["UploadId"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/offset+octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description On the disk */
+            204: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    "Upload-Offset": components["headers"]["UploadOffset"];
+                    "Upload-Expires": components["headers"]["UploadExpires"];
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            400: components["responses"]["Problem"];
+            404: components["responses"]["Problem"];
+            408: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            411: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            423: components["responses"]["Busy"];
+            460: components["responses"]["Problem"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1556,6 +2277,7 @@ export interface operations {
             };
             400: components["responses"]["Problem"];
             408: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
             411: components["responses"]["Problem"];
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
@@ -1608,6 +2330,9 @@ export interface operations {
         responses: {
             204: components["responses"]["Done"];
             404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1665,7 +2390,10 @@ export interface operations {
     createSession: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
+            };
             path?: never;
             cookie?: never;
         };
@@ -1688,6 +2416,7 @@ export interface operations {
             };
             400: components["responses"]["Problem"];
             404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
@@ -1729,7 +2458,117 @@ export interface operations {
         responses: {
             204: components["responses"]["Done"];
             404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
             412: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    changeSession: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
+                "If-Match"?: components["parameters"]["IfMatch"];
+            };
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SessionChange"];
+            };
+        };
+        responses: {
+            200: components["responses"]["Session"];
+            400: components["responses"]["Problem"];
+            404: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    listShares: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The links */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ShareList"];
+                };
+            };
+            404: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    createShare: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ShareRequest"];
+            };
+        };
+        responses: {
+            /** @description The link */
+            201: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    Location: components["headers"]["Location"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NewShare"];
+                };
+            };
+            400: components["responses"]["Problem"];
+            404: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            429: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    revokeShare: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+                share: components["parameters"]["ShareId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            204: components["responses"]["Done"];
+            404: components["responses"]["Problem"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1789,6 +2628,8 @@ export interface operations {
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1812,6 +2653,8 @@ export interface operations {
             404: components["responses"]["Problem"];
             409: components["responses"]["Problem"];
             412: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1819,6 +2662,8 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
                 /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
                 "If-Match"?: components["parameters"]["IfMatch"];
             };
@@ -1853,6 +2698,8 @@ export interface operations {
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -1888,7 +2735,12 @@ export interface operations {
     previewFrame: {
         parameters: {
             query?: {
-                /** @description What a frame carries beside the positions, as far as the cloud has it */
+                /**
+                 * @description What a frame carries beside the positions, as far as the cloud has it: normal (which it has unless told otherwise), t,
+                 *     detail, color, marks, ids, radius. Of a file, as of a cloud's: what it keeps; all of the cloud's where this is absent.
+                 *     detail is a scalar of its own there, and comes where it is named; so are stretch and minor_stretch (the principal
+                 *     stretches of each sample's cell, factors), anisotropy (their quotient) and area_change (their product).
+                 */
                 attributes?: components["parameters"]["Attributes"];
             };
             header?: never;
@@ -1967,6 +2819,8 @@ export interface operations {
         parameters: {
             query?: never;
             header: {
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
                 /** @description The revision that the edit was made for, as the session's ETag says it; or * for any */
                 "If-Match": string;
             };
@@ -2000,6 +2854,98 @@ export interface operations {
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
             428: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    getEdit: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+                /** @description The number of an edit in the history; the first one has 1 */
+                edit: components["parameters"]["EditIndex"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The edit */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    ETag: components["headers"]["ETag"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EditRecord"];
+                };
+            };
+            404: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    amendEdit: {
+        parameters: {
+            query?: never;
+            header: {
+                /** @description The revision that the change is made for, as the session's ETag says it; or * for any */
+                "If-Match": components["parameters"]["OwedIfMatch"];
+            };
+            path: {
+                session: components["parameters"]["SessionId"];
+                /** @description The number of an edit in the history; the first one has 1 */
+                edit: components["parameters"]["EditIndex"];
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Edit"];
+            };
+        };
+        responses: {
+            200: components["responses"]["Session"];
+            400: components["responses"]["Problem"];
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            428: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    removeEdit: {
+        parameters: {
+            query?: never;
+            header: {
+                /** @description The revision that the change is made for, as the session's ETag says it; or * for any */
+                "If-Match": components["parameters"]["OwedIfMatch"];
+            };
+            path: {
+                session: components["parameters"]["SessionId"];
+                /** @description The number of an edit in the history; the first one has 1 */
+                edit: components["parameters"]["EditIndex"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: components["responses"]["Session"];
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            412: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            428: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -2029,6 +2975,8 @@ export interface operations {
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -2066,6 +3014,8 @@ export interface operations {
         parameters: {
             query?: never;
             header: {
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
                 /** @description The revision that the recipe is applied to, as the session's ETag says it; or * for any */
                 "If-Match": string;
             };
@@ -2089,6 +3039,8 @@ export interface operations {
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
             428: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -2096,13 +3048,20 @@ export interface operations {
         parameters: {
             query?: {
                 /** @description Instead of the Accept header */
-                format?: "ply" | "draco" | "xyz" | "frame";
+                format?: "ply" | "draco" | "xyz" | "las" | "frame";
+                /** @description Of a PLY file */
+                encoding?: components["parameters"]["Encoding"];
                 /** @description The level of the hierarchy; the finest where not given */
                 level?: number;
                 /** @description Plays the applied edits part of the way, recording nothing: 0 is the rest, 1 the committed state, both to the bit */
                 s?: number;
                 timing?: components["schemas"]["Timing"];
-                /** @description What a frame carries beside the positions, as far as the cloud has it */
+                /**
+                 * @description What a frame carries beside the positions, as far as the cloud has it: normal (which it has unless told otherwise), t,
+                 *     detail, color, marks, ids, radius. Of a file, as of a cloud's: what it keeps; all of the cloud's where this is absent.
+                 *     detail is a scalar of its own there, and comes where it is named; so are stretch and minor_stretch (the principal
+                 *     stretches of each sample's cell, factors), anisotropy (their quotient) and area_change (their product).
+                 */
                 attributes?: components["parameters"]["Attributes"];
             };
             header?: {
@@ -2142,6 +3101,8 @@ export interface operations {
             query?: {
                 /** @description What the frames carry beside the positions, as far as the cloud has it */
                 attributes?: components["parameters"]["StreamAttributes"];
+                /** @description The name that others see while the stream is open */
+                viewer?: components["parameters"]["ViewerName"];
             };
             header?: never;
             path: {
@@ -2159,6 +3120,38 @@ export interface operations {
                 };
                 content: {
                     "application/octet-stream": string;
+                };
+            };
+            404: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            503: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    events: {
+        parameters: {
+            query?: {
+                /** @description The name that others see while the stream is open */
+                viewer?: components["parameters"]["ViewerName"];
+            };
+            header?: {
+                "Last-Event-ID"?: string;
+            };
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Events without end */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/event-stream": string;
                 };
             };
             404: components["responses"]["Problem"];

@@ -1,8 +1,10 @@
 import type { ApiClient } from "../api/client";
+import { reportError } from "../edits/errors";
 import type { Bus, SessionStore } from "../session-store";
 import { h, replaceChildren } from "./dom";
 import { rangeField } from "./fields";
 import { icon } from "./icons";
+import { saveFile } from "./save-file";
 
 /** The recorded edits as a whole: played part of the way, kept as a file, and taken from one. */
 export function createPlayback(
@@ -47,6 +49,15 @@ export function createPlayback(
       // The server names the file.
       download: "",
       data: { action: "recipe" },
+      onclick: async (event) => {
+        if (client.token() === null) return;
+        event.preventDefault();
+        try {
+          saveFile(await client.file(client.recipeUrl(store.id)), "recipe.json");
+        } catch (error) {
+          reportError(bus, error, "The recipe cannot be fetched");
+        }
+      },
     },
     icon("export"),
     "Download",

@@ -1,8 +1,10 @@
 import type { ApiClient } from "../api/client";
 import type { ExportFormat } from "../api/types";
+import { reportError } from "../edits/errors";
 import type { Bus, SessionStore } from "../session-store";
 import { h } from "./dom";
 import { type IconName, icon, logo } from "./icons";
+import { saveFile } from "./save-file";
 
 const FORMATS: readonly (readonly [ExportFormat, string, string])[] = [
   ["ply", "PLY", "all attributes, full precision"],
@@ -56,6 +58,21 @@ export function createTopBar(bus: Bus, client: ApiClient, store: SessionStore): 
     },
     icon("link"),
   );
+  const share = h(
+    "button",
+    {
+      type: "button",
+      class: "button",
+      onclick: async () => {
+        try {
+          await (await import("./share-dialog")).showShareDialog(bus, client, store);
+        } catch (error) {
+          reportError(bus, error, "The links cannot be shown");
+        }
+      },
+    },
+    "Share…",
+  );
   const help = button("help", "Shortcuts", "?", () => bus.invoke("shortcuts.show"));
   return h(
     "header",
@@ -71,9 +88,10 @@ export function createTopBar(bus: Bus, client: ApiClient, store: SessionStore): 
     h("span", { class: "spacer" }),
     h("div", { class: "top-group" }, undo, redo),
     h("span", { class: "divider", aria: { hidden: "true" } }),
+    share,
     link,
     help,
-    exportMenu(client, store),
+    exportMenu(bus, client, store),
   );
 }
 
@@ -91,8 +109,15 @@ async function copyLink(bus: Bus): Promise<void> {
 }
 
 /** Native disclosure, closed by a choice, by Escape and by a press elsewhere. */
-function exportMenu(client: ApiClient, store: SessionStore): HTMLElement {
+function exportMenu(bus: Bus, client: ApiClient, store: SessionStore): HTMLElement {
   const name = store.document.name.replace(/\.[^.]+$/, "") || "cloud";
+  const save = async (format: ExportFormat): Promise<void> => {
+    try {
+      saveFile(await client.file(client.exportUrl(store.id, format)), `${name}.${EXTENSIONS[format]}`);
+    } catch (error) {
+      reportError(bus, error, "The file cannot be fetched");
+    }
+  };
   const items = FORMATS.map(([format, title, hint]) =>
     h(
       "a",
@@ -101,7 +126,12 @@ function exportMenu(client: ApiClient, store: SessionStore): HTMLElement {
         href: client.exportUrl(store.id, format),
         download: `${name}.${EXTENSIONS[format]}`,
         data: { format },
-        onclick: () => menu.removeAttribute("open"),
+        onclick: (event) => {
+          menu.removeAttribute("open");
+          if (client.token() === null) return;
+          event.preventDefault();
+          void save(format);
+        },
       },
       h("strong", {}, title),
       h("small", {}, hint),

@@ -17,7 +17,7 @@ export function createUploader(
     type: "file",
     id,
     class: "visually-hidden",
-    accept: ".ply,.drc,.xyz,.txt,.asc",
+    accept: ".ply,.drc,.las,.pcd,.obj,.xyz,.txt,.asc",
   });
   const dropId = freshId();
   const drop = h("input", { type: "checkbox", id: dropId });
@@ -33,7 +33,11 @@ export function createUploader(
       h("label", { htmlFor: id, class: "file-label" }, "choose a file"),
       input,
     ),
-    h("p", { class: "hint" }, "PLY, Draco or XYZ. The vertices of a mesh are taken as samples."),
+    h(
+      "p",
+      { class: "hint" },
+      "PLY, LAS, PCD, OBJ, Draco or XYZ. The vertices of a mesh are taken as samples.",
+    ),
     h(
       "p",
       { class: "drop-option" },
@@ -55,7 +59,8 @@ export function createUploader(
     replaceChildren(status, h("div", { class: "upload-row" }, text, cancel), bar);
     zone.classList.add("busy");
     try {
-      const cloud = await uploadCloud(client.url(""), file, {
+      const cloud = await uploadCloud(client, file, {
+        token: client.token(),
         dropNonFinite: drop.checked,
         signal: controller.signal,
         onProgress: (fraction) => {

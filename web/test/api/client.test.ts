@@ -148,5 +148,8 @@ test("files are sent as what their names say, and as bytes where they say nothin
   expect(mediaTypeOf("dragon.PLY")).toBe("application/x-ply");
   expect(mediaTypeOf("a.b.drc")).toBe("model/x-draco");
   expect(mediaTypeOf("points.xyz")).toBe("text/plain");
+  expect(mediaTypeOf("yard.las")).toBe("application/vnd.las");
+  expect(mediaTypeOf("mesh.obj")).toBe("model/obj");
+  expect(mediaTypeOf("frame.pcd")).toBe("model/x-pcd");
   expect(mediaTypeOf("points")).toBe("application/octet-stream");
 });

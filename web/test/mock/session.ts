@@ -173,6 +173,7 @@ export class MockSession {
       edit,
       created: new Date().toISOString(),
       moved_samples: this.marks.length,
+      surface_hash: "0".repeat(64),
       zero_samples: 0,
       one_samples: 0,
       inserted: 0,

@@ -50,6 +50,7 @@ const schemaOfExample: Record<string, string> = {
   "event-session": "SessionEvent",
   "event-progress": "ProgressEvent",
   "event-heartbeat": "HeartbeatEvent",
+  "event-presence": "PresenceEvent",
   "event-end": "EndEvent",
 };
 for (const media of mediaTypes()) {

@@ -1,0 +1,110 @@
+import type { ApiClient } from "./client";
+import { ApiError } from "./problem";
+import type { CloudDocument } from "./types";
+import type { UploadOptions } from "./upload";
+
+/** What one request carries: little to send again where the connection breaks. */
+const PIECE_BYTES = 8 << 20;
+const MOST_TRIES = 8;
+const VERSION = { "Tus-Resumable": "1.0.0" };
+
+/** Where an unfinished upload of the very same file is remembered, over reloads too. */
+export interface Memory {
+  getItem(key: string): string | null;
+  setItem(key: string, value: string): void;
+  removeItem(key: string): void;
+}
+
+export interface PieceOptions extends UploadOptions {
+  memory?: Memory;
+  /** Resolves after so many milliseconds. */
+  pause?: (ms: number) => Promise<void>;
+}
+
+function base64(text: string): string {
+  return btoa(String.fromCharCode(...new TextEncoder().encode(text)));
+}
+
+/** Whether trying again may help: the connection broke, the server is busy, or another request has the upload. */
+function isPassing(error: unknown): boolean {
+  return error instanceof ApiError && (error.status === 0 || error.status === 423 || error.status >= 500);
+}
+
+/** Sends a file in pieces that outlive the connection (tus 1.0.0), from where the last try ended; then imports it. */
+export async function uploadInPieces(
+  client: ApiClient,
+  file: File,
+  options: PieceOptions = {},
+): Promise<CloudDocument> {
+  const memory = options.memory ?? globalThis.localStorage;
+  const pause = options.pause ?? ((ms) => new Promise((resolve) => setTimeout(resolve, ms)));
+  const signal = options.signal ? { signal: options.signal } : {};
+  const key = `pointwright.upload ${client.url("")} ${file.name} ${file.size} ${file.lastModified}`;
+
+  const offsetOf = async (upload: string): Promise<number> => {
+    const head = await client.request(upload, { method: "HEAD", headers: VERSION, ...signal });
+    return Number(head.headers.get("Upload-Offset"));
+  };
+  const begin = async (): Promise<string> => {
+    const metadata = `filename ${base64(file.name)}`;
+    const headers = { ...VERSION, "Upload-Length": String(file.size), "Upload-Metadata": metadata };
+    const made = await client.request("v1/uploads", { method: "POST", headers, ...signal });
+    const upload = (made.headers.get("Location") ?? "").replace(/^\//, "");
+    memory.setItem(key, upload);
+    return upload;
+  };
+
+  let upload = memory.getItem(key);
+  let offset = 0;
+  let tries = 0;
+  while (upload === null || offset < file.size) {
+    try {
+      if (upload === null) {
+        upload = await begin();
+      } else if (offset === 0 || tries > 0) {
+        offset = await offsetOf(upload);
+      }
+      options.onProgress?.(offset / file.size);
+      if (offset >= file.size) break;
+      const headers = {
+        ...VERSION,
+        "Content-Type": "application/offset+octet-stream",
+        "Upload-Offset": String(offset),
+      };
+      const body = file.slice(offset, offset + PIECE_BYTES);
+      const done = await client.request(upload, { method: "PATCH", headers, body, ...signal });
+      offset = Number(done.headers.get("Upload-Offset"));
+      tries = 0;
+    } catch (error) {
+      if (options.signal?.aborted && upload !== null) {
+        // Given up by hand: nothing of it is kept.
+        memory.removeItem(key);
+        await client.request(upload, { method: "DELETE", headers: VERSION }).catch(() => undefined);
+        throw error;
+      }
+      const status = error instanceof ApiError ? error.status : 0;
+      if (status === 404 && upload !== null && tries === 0) {
+        // It expired, or was imported meanwhile: from the start, once.
+        memory.removeItem(key);
+        upload = null;
+        offset = 0;
+        tries = 1;
+        continue;
+      }
+      tries += 1;
+      if (!(isPassing(error) || status === 409) || tries > MOST_TRIES) throw error;
+      await pause(Math.min(250 * 2 ** tries, 10_000));
+    }
+  }
+  options.onProgress?.(1);
+  const id = upload.split("/").pop();
+  const body = JSON.stringify({
+    upload: id,
+    name: file.name,
+    nonfinite: options.dropNonFinite ? "drop" : "reject",
+  });
+  const headers = { "Content-Type": "application/json" };
+  const cloud = await client.request("v1/clouds", { method: "POST", headers, body, ...signal });
+  memory.removeItem(key);
+  return (await cloud.json()) as CloudDocument;
+}

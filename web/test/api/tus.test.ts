@@ -1,0 +1,124 @@
+import { describe, expect, it } from "vitest";
+import { ApiClient } from "../../src/api/client";
+import { uploadInPieces } from "../../src/api/tus";
+
+const ID = "u7k8l9m0n1o2p-q_r3s4t5";
+const PIECE = 8 << 20;
+
+/** A server of one upload; `breaks` requests in a row lose their answer. */
+function stand(breaks: number[] = []) {
+  const log: string[] = [];
+  let offset = 0;
+  let length = -1;
+  let count = 0;
+  const fetch = async (url: string, init: RequestInit = {}): Promise<Response> => {
+    const headers = new Headers(init.headers);
+    const path = url.replace("http://host/", "");
+    log.push(`${init.method} ${path} ${headers.get("Upload-Offset") ?? ""}`.trim());
+    if (path !== "v1/clouds") expect(headers.get("Tus-Resumable")).toBe("1.0.0");
+    const missing = () => new Response("{}", { status: 404 });
+    count += 1;
+    if (init.method === "POST" && path === "v1/uploads") {
+      length = Number(headers.get("Upload-Length"));
+      offset = 0;
+      return new Response(null, { status: 201, headers: { Location: `/v1/uploads/${ID}` } });
+    }
+    if (path === "v1/clouds") {
+      expect(JSON.parse(String(init.body))).toEqual({ upload: ID, name: "ö.las", nonfinite: "drop" });
+      expect(offset).toBe(length);
+      return new Response(JSON.stringify({ id: "cloud" }), { status: 201 });
+    }
+    if (length < 0) return missing();
+    if (init.method === "PATCH") {
+      if (Number(headers.get("Upload-Offset")) !== offset) return new Response("{}", { status: 409 });
+      const size = (init.body as Blob).size;
+      // Half a piece is on the disk when the connection breaks.
+      if (breaks.includes(count)) {
+        offset += size / 2;
+        throw new TypeError("connection lost");
+      }
+      offset += size;
+      return new Response(null, { status: 204, headers: { "Upload-Offset": String(offset) } });
+    }
+    if (init.method === "DELETE") return new Response(null, { status: 204 });
+    return new Response(null, { headers: { "Upload-Offset": String(offset) } });
+  };
+  return { client: new ApiClient("http://host/", fetch), log, at: () => offset };
+}
+
+function memory(): Storage & { all: Map<string, string> } {
+  const all = new Map<string, string>();
+  return {
+    all,
+    getItem: (key: string) => all.get(key) ?? null,
+    setItem: (key: string, value: string) => void all.set(key, value),
+    removeItem: (key: string) => void all.delete(key),
+  } as unknown as Storage & { all: Map<string, string> };
+}
+
+const file = () => new File([new Uint8Array(2.5 * PIECE)], "ö.las", { lastModified: 5 });
+const pause = async () => undefined;
+
+describe("an upload in pieces", () => {
+  it("sends them in order, tells how far it is, imports, and forgets", async () => {
+    const { client, log } = stand();
+    const store = memory();
+    const told: number[] = [];
+    const options = { memory: store, pause, dropNonFinite: true, onProgress: (f: number) => told.push(f) };
+    expect(await uploadInPieces(client, file(), options)).toEqual({ id: "cloud" });
+    expect(log).toEqual([
+      "POST v1/uploads",
+      `PATCH v1/uploads/${ID} 0`,
+      `PATCH v1/uploads/${ID} ${PIECE}`,
+      `PATCH v1/uploads/${ID} ${2 * PIECE}`,
+      "POST v1/clouds",
+    ]);
+    expect(told).toEqual([0, 0.4, 0.8, 1]);
+    expect(store.all.size).toBe(0);
+  });
+
+  it("goes on from what the server has after a broken connection", async () => {
+    const { client, log } = stand([3]);
+    await uploadInPieces(client, file(), { memory: memory(), pause, dropNonFinite: true });
+    expect(log).toContain(`HEAD v1/uploads/${ID}`);
+    expect(log).toContain(`PATCH v1/uploads/${ID} ${1.5 * PIECE}`);
+  });
+
+  it("goes on after a reload, and starts anew where the upload is gone", async () => {
+    const broken = stand([3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20]);
+    const store = memory();
+    await expect(
+      uploadInPieces(broken.client, file(), { memory: store, pause, dropNonFinite: true }),
+    ).rejects.toThrow();
+    expect([...store.all.values()]).toEqual([`v1/uploads/${ID}`]);
+    const elsewhere = stand();
+    await uploadInPieces(elsewhere.client, file(), { memory: store, pause, dropNonFinite: true });
+    expect(elsewhere.log.slice(0, 3)).toEqual([
+      `HEAD v1/uploads/${ID}`,
+      "POST v1/uploads",
+      `PATCH v1/uploads/${ID} 0`,
+    ]);
+  });
+
+  it("is removed where it is cancelled", async () => {
+    const { client, log } = stand();
+    const store = memory();
+    const controller = new AbortController();
+    const onProgress = (fraction: number) => {
+      if (fraction > 0) controller.abort();
+    };
+    const stopping = new ApiClient("http://host/", (url, init) => {
+      if (init?.signal?.aborted) return Promise.reject(new DOMException("cancelled", "AbortError"));
+      return client.request(url.replace("http://host/", ""), init);
+    });
+    const sending = uploadInPieces(stopping, file(), {
+      memory: store,
+      pause,
+      onProgress,
+      signal: controller.signal,
+    });
+    await expect(sending).rejects.toThrow("cancelled");
+    expect(log.at(-1)).toBe(`DELETE v1/uploads/${ID}`);
+    expect(store.all.size).toBe(0);
+  });
+});
