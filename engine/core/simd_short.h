@@ -1,6 +1,8 @@
 #pragma once
 // 16-bit integers in memory, one a lane, for kernel sources (engine/core/simd.h).
 
+#include <cstdint>
+
 #include "engine/core/simd.h"
 
 namespace pointwright::POINTWRIGHT_SIMD_NAMESPACE {

@@ -6,6 +6,8 @@
 // monotone, so it never exceeds that distance. Squares are compared with a margin far above their rounding
 // and that of the distances. So ruling out loses nothing, not even a tie.
 
+#include <cstdint>
+
 #include "engine/core/simd.h"
 #include "engine/editing/region_kernels.h"
 

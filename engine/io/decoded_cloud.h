@@ -1,6 +1,8 @@
 #pragma once
 // read_cloud() in its two halves, for callers that decode in one process and finish in another.
 
+#include <span>
+
 #include "engine/io/cloud_io.h"
 
 namespace pointwright {

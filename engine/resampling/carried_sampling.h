@@ -1,7 +1,9 @@
 #pragma once
 // What an edit without resampling does to the samples.
 
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "engine/editing/edit.h"
 #include "engine/multires/sampling.h"

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "protocol/frames/frame.h"
 #include "protocol/frames/quantise_kernels.h"

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "server/access/accounts.h"
 #include "server/access/buckets.h"

@@ -2,6 +2,7 @@
 // `pointwright smooth` and `pointwright simplify`: §3's operations on whole clouds.
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 

@@ -1,6 +1,14 @@
 #pragma once
 // Clouds as files to download, single frames and long texts.
 
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "engine/io/cloud_io.h"
 #include "server/handlers/query.h"
 #include "server/handlers/service.h"

@@ -1,6 +1,10 @@
 #pragma once
 // The tus protocol, version 1.0.0 (https://tus.io/protocols/resumable-upload): what its routes share.
 
+#include <memory>
+#include <optional>
+#include <string_view>
+
 #include "server/handlers/service.h"
 
 namespace pointwright::server {

@@ -2,9 +2,11 @@
 // The strict reader of request heads. A pure function over bytes: no socket, no library.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "server/http/message.h"
 #include "server/http/problem_response.h"

@@ -1,6 +1,7 @@
 #pragma once
 // Problems as answers, and values that may be problems.
 
+#include <string_view>
 #include <variant>
 
 #include "protocol/json/problem.h"

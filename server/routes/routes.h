@@ -2,6 +2,7 @@
 // The one table of routes, and how a request finds its row.
 
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 

@@ -1,6 +1,7 @@
 #pragma once
 // Steps that exporting, applying and playing share.
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory>

@@ -3,11 +3,15 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "engine/editing/painted_field.h"
 #include "server/base/outcome.h"
@@ -68,8 +72,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<Done> put_preview(const protocol::PreviewRequest& request, Expected expected = {});
   /// Computes a preview's key frame without showing it to anyone.
   Outcome<SharedFrame> render_preview(const protocol::PreviewRequest& request, std::uint16_t attributes);
-  /// Ends the drag: the committed state is shown again.
-  Outcome<Done> end_preview();
+  Outcome<Done> end_preview();  ///< ends the drag: the committed state is shown again
 
   struct Committed {
     SharedDocument document;
@@ -156,9 +159,8 @@ class Session : public std::enable_shared_from_this<Session> {
     try {
       return strand_.submit(std::move(work)).get();
     } catch (const std::future_error&) {
-      // The pool was stopped with the task in it.
-      return protocol::Problem{.kind = protocol::ProblemKind::kOverloaded,
-                               .detail = "the server is stopping"};
+      using Kind = protocol::ProblemKind;  // the pool was stopped with the task in it
+      return protocol::Problem{.kind = Kind::kOverloaded, .detail = "the server is stopping"};
     }
   }
 
@@ -168,8 +170,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Strand strand_;
   Display display_;
   std::shared_ptr<Feed> feed_ = std::make_shared<Feed>();
-  /// Shared: viewers that outlive the session leave it too.
-  std::shared_ptr<Presence> presence_;
+  std::shared_ptr<Presence> presence_;  // shared: viewers that outlive the session leave it too
 
   mutable std::mutex document_mutex_;  // guards document_, timings_ and closed_
   SharedDocument document_;
@@ -193,7 +194,6 @@ class Session : public std::enable_shared_from_this<Session> {
   std::optional<protocol::Problem> field_problem_;
   RegionField field_;
   std::atomic<bool> field_scheduled_{false};
-
   DragTurns drags_;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 // What a session is made from, and what it computes with.
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>

@@ -2,6 +2,7 @@
 // The uploaded clouds: what is known of them, and their samples once somebody needs them.
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>

@@ -1,6 +1,7 @@
 #pragma once
 // The uploaded images, in memory, as pixels and as the files that they came from.
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>

@@ -1,6 +1,7 @@
 #pragma once
 // From uploaded bytes to a stored cloud.
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>

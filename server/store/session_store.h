@@ -2,6 +2,7 @@
 // All sessions: those that are awake, and those that sleep in the archive until somebody asks for them.
 
 #include <condition_variable>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>

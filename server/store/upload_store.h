@@ -1,12 +1,14 @@
 #pragma once
 // Resumable uploads: bytes on disk, never in memory, that survive the client's connection and the daemon.
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>

@@ -2,6 +2,7 @@
 // A viewer's end of a session's stream.
 
 #include <chrono>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>

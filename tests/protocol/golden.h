@@ -3,6 +3,7 @@
 // documents that the server sends (protocol/examples). A tool writes them, a test compares them with what the
 // code gives today.
 
+#include <cstdint>
 #include <string>
 #include <vector>
 

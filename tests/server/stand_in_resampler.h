@@ -2,6 +2,9 @@
 // A stand-in for apply_resampled_edit, quick and easy to follow: samples that move far enough get a double.
 
 #include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 

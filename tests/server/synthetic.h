@@ -2,6 +2,7 @@
 // Small clouds and requests that the server's tests share.
 
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 
 #include "engine/core/cloud.h"

@@ -1,6 +1,7 @@
 #pragma once
 // What commands to a service read from their arguments, and where they put what they fetch.
 
+#include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>

@@ -1,6 +1,7 @@
 #pragma once
 // Uploads of files: in one request, or in parts that survive a break (tus 1.0).
 
+#include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
