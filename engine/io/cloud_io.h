@@ -50,6 +50,10 @@ struct AttributeRange {
   std::uint64_t non_finite = 0;  ///< values that are neither counted in min nor in max
 };
 
+/// The origin that read_cloud() gives a cloud between these corners: zero on the axes where float32 serves
+/// its positions well as they are.
+Vec3d recentring_origin(const Vec3d& min, const Vec3d& max);
+
 enum class NormalQuality { kNone, kUnit, kScaled };
 
 /// What was found: the upload's lint.

@@ -145,21 +145,6 @@ Result<void> check_range(const Range& range, bool is_double) {
   return {};
 }
 
-// Multiples of a power of two subtract from float32 coordinates without a rounding.
-Vec3d chosen_origin(const Range& range) {
-  const double extent = range.extent();
-  Vec3d origin = Vec3d::Zero();
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (range.farthest()[axis] <= kNearZero * extent) continue;
-    const double middle = 0.5 * (range.min[axis] + range.max[axis]);
-    // Without an extent the place itself is the origin, as a float32.
-    const double step = extent > 0.0 ? std::exp2(std::ceil(std::log2(extent)) - 3.0) : 0.0;
-    origin[axis] =
-        step > 0.0 ? std::round(middle / step) * step : static_cast<double>(static_cast<float>(middle));
-  }
-  return origin;
-}
-
 // A file's own origin is kept where the positions around it lie near zero: then float32 serves them well.
 bool keeps_origin(const Cloud& cloud, const Range& range) {
   if (cloud.origin.isZero(0.0) || !cloud.exact_position.empty()) return false;
@@ -170,7 +155,7 @@ bool keeps_origin(const Cloud& cloud, const Range& range) {
 
 void recentre(Cloud& cloud, const Range& range) {
   if (keeps_origin(cloud, range)) return;
-  const Vec3d origin = chosen_origin(range);
+  const Vec3d origin = recentring_origin(range.min, range.max);
   const bool is_plain_float = cloud.exact_position.empty() && cloud.origin.isZero(0.0);
   if (is_plain_float && origin.isZero(0.0)) return;
   std::vector<Position> exact(cloud.size());
@@ -219,6 +204,21 @@ std::uint64_t count_duplicates(const Cloud& cloud) {
 }
 
 }  // namespace
+
+// Multiples of a power of two subtract from float32 coordinates without a rounding.
+Vec3d recentring_origin(const Vec3d& min, const Vec3d& max) {
+  const double extent = (max - min).maxCoeff();
+  Vec3d origin = Vec3d::Zero();
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (std::max(std::abs(min[axis]), std::abs(max[axis])) <= kNearZero * extent) continue;
+    const double middle = 0.5 * (min[axis] + max[axis]);
+    // Without an extent the place itself is the origin, as a float32.
+    const double step = extent > 0.0 ? std::exp2(std::ceil(std::log2(extent)) - 3.0) : 0.0;
+    origin[axis] =
+        step > 0.0 ? std::round(middle / step) * step : static_cast<double>(static_cast<float>(middle));
+  }
+  return origin;
+}
 
 Result<ImportedCloud> finish_cloud(ImportedCloud decoded, const ImportParams& params) {
   ImportedCloud& imported = decoded;

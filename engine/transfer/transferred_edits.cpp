@@ -92,8 +92,8 @@ Result<void> check_script(const EditScript& script, const MultiresSurface& surfa
 }  // namespace
 
 Result<TransferredSamples> transfer_edits(const EditScript& script, const AnchorIndex& index,
-                                          std::shared_ptr<const Cloud> cloud,
-                                          const ExecutionContext& context) {
+                                          std::shared_ptr<const Cloud> cloud, const ExecutionContext& context,
+                                          MultiresSurface* rest) {
   if (cloud->size() == 0)
     return Error{.code = ErrorCode::kEmptyCloud, .message = "the cloud has no samples", .field = "cloud"};
   POINTWRIGHT_CHECK(cloud->origin == script.origin, "positions relative to the script's origin");
@@ -116,7 +116,7 @@ Result<TransferredSamples> transfer_edits(const EditScript& script, const Anchor
   if (auto valid = check_script(script, surface); !valid) return valid.error();
   if (auto made = decompose_onto(script.bases, script.spacing_ratio, anchors, surface, context); !made)
     return made.error();
-  result.rest = surface;
+  if (rest != nullptr) *rest = surface;
 
   std::vector<float> spacing = local_spacing(cloud->position, *graph);
   result.sampling =
@@ -142,6 +142,7 @@ Result<TransferredSamples> transfer_edits(const EditScript& script, const Anchor
     }
   }
   result.surface = std::move(surface);
+  result.anchor = std::move(anchors);
   return result;
 }
 

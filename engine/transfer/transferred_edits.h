@@ -49,8 +49,8 @@ struct EditScript {
 
 /// Samples after the edits, with all their levels.
 struct TransferredSamples {
-  MultiresSurface rest;     ///< before the first edit: decomposed against the preview's bases
-  MultiresSurface surface;  ///< after the last one
+  MultiresSurface surface;            ///< after the last edit
+  std::vector<std::uint32_t> anchor;  ///< of each sample of it: the preview's sample that stands for it
   std::shared_ptr<const Sampling> sampling;
 };
 
@@ -67,8 +67,9 @@ struct TransferredSamples {
 /// Cost:        O(N k); about 90 + 28 n bytes a sample for n bands
 /// Determinism: bitwise equal for any thread count and instruction set
 /// Cancels:     between phases and blocks of samples
+/// `rest`, where given, becomes the surface before the first edit.
 Result<TransferredSamples> transfer_edits(const EditScript& script, const AnchorIndex& anchors,
-                                          std::shared_ptr<const Cloud> cloud,
-                                          const ExecutionContext& context);
+                                          std::shared_ptr<const Cloud> cloud, const ExecutionContext& context,
+                                          MultiresSurface* rest = nullptr);
 
 }  // namespace pointwright

@@ -6,6 +6,7 @@
 
 #include "protocol/json/documents.h"
 #include "server/cli/geometry_commands.h"
+#include "server/cli/job_command.h"
 #include "server/cli/local_file.h"
 #include "server/cli/remote/commands.h"
 #include "server/ingest/files.h"
@@ -215,6 +216,8 @@ int run_command(const std::vector<std::string>& arguments, std::ostream& out, st
         ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 30U))
         ->capture_default_str();
   }
+  JobRunOptions job;
+  CLI::App* const job_command = add_job_run(*app.get_subcommand("job"), job);
   try {
     std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
     app.parse(std::move(reversed));
@@ -227,6 +230,7 @@ int run_command(const std::vector<std::string>& arguments, std::ostream& out, st
       out << bash_completion(app);
       return 0;
     }
+    if (job_command->parsed()) return run_job(job, out, err);
     if (const auto status = remote.run(out, err)) return *status;
     if (convert_command->parsed()) return convert(options, out, err);
     if (smooth_command->parsed())

@@ -23,24 +23,39 @@ LevelBases bases_of(Hierarchy& hierarchy) {
   return {.bands = std::move(hierarchy.bases), .spacing = median(hierarchy.spacing)};
 }
 
+RestModel rest_model(const Cloud& cloud, const HierarchyParams& params, HierarchyBuilder build) {
+  return {.params = params,
+          .origin = cloud.origin,
+          .diagonal = bounds_of(cloud.position).diagonal(),
+          .build = std::move(build),
+          .resample = apply_resampled_edit,
+          .room = std::make_shared<SampleRoom>(kNoParent)};
+}
+
+SurfaceState state_at_rest(std::shared_ptr<const Cloud> cloud, Hierarchy hierarchy) {
+  SharedSamples samples = samples_at_rest(
+      rest_sampling(std::move(cloud), std::make_shared<const NeighborGraph>(std::move(hierarchy.graph)),
+                    std::move(hierarchy.spacing)),
+      hierarchy.surface.finest());
+  return {.surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
+          .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),
+          .first_valid_level = 0,
+          .samples = std::move(samples)};
+}
+
 /// The state of a recipe that is being played, and the script that grows with it.
 class Player {
  public:
   Player(std::shared_ptr<const Cloud> preview, const HierarchyParams& params, const ExecutionContext& context)
       : context_(context) {
     limits_.max_operations = protocol::kMaxPaintOperations;
-    rest_ = RestModel{
-        .params = params,
-        .origin = preview->origin,
-        .diagonal = bounds_of(preview->position).diagonal(),
-        .build =
-            [this](const Cloud& cloud, const HierarchyParams& levels, const ExecutionContext& running) {
-              auto built = build_hierarchy(cloud, levels, running);
-              if (built) derived_ = bases_of(built.value());
-              return built;
-            },
-        .resample = apply_resampled_edit,
-        .room = std::make_shared<SampleRoom>(kNoParent)};
+    rest_ = rest_model(
+        *preview, params,
+        [this](const Cloud& cloud, const HierarchyParams& levels, const ExecutionContext& running) {
+          auto built = build_hierarchy(cloud, levels, running);
+          if (built) derived_ = bases_of(built.value());
+          return built;
+        });
     cloud_ = std::move(preview);
   }
 
@@ -54,16 +69,8 @@ class Player {
                .edits = {},
                .neighbors = rest_.params.neighbors,
                .spacing_ratio = 1.0F};
-    const SharedSamples samples = samples_at_rest(
-        rest_sampling(cloud_, std::make_shared<const NeighborGraph>(std::move(hierarchy.graph)),
-                      std::move(hierarchy.spacing)),
-        hierarchy.surface.finest());
-    shared_ids_ = rest_.uploaded_ids = samples->sampling->next_id;
-    made_ = {
-        .surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
-        .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),
-        .first_valid_level = 0,
-        .samples = samples};
+    made_ = state_at_rest(cloud_, std::move(hierarchy));
+    shared_ids_ = rest_.uploaded_ids = made_.samples->sampling->next_id;
     whole_ = made_;
     return std::nullopt;
   }
@@ -182,6 +189,30 @@ Outcome<PlayedRecipe> play_on_preview(const protocol::RecipeRequest& request,
     if (auto problem = player.add(i, edits[i], part, i + 1 < count)) return *problem;
   }
   return player.finish();
+}
+
+Result<SurfaceState> edit_directly(const EditScript& script, std::shared_ptr<const Cloud> cloud,
+                                   const HierarchyParams& params, const ExecutionContext& context) {
+  RestModel rest = rest_model(*cloud, params, build_hierarchy);
+  auto built = build_hierarchy(*cloud, params, context);
+  if (!built) return built.error();
+  SurfaceState state = state_at_rest(std::move(cloud), std::move(built).value());
+  rest.uploaded_ids = state.samples->sampling->next_id;
+  for (const TransferredEdit& edit : script.edits) {
+    auto ready = with_valid_level(rest, state, edit.params.level, context);
+    if (!ready) return ready.error();
+    state = std::move(ready).value();
+    const Points& position = state.surface->levels[edit.params.level].position;
+    const RegionField field{.t = std::make_shared<const ScaleField>(
+                                compute_scale_field(position, edit.regions, edit.params.blend, &context)),
+                            .regions = std::make_shared<const RegionPair>(edit.regions),
+                            .samples = state.samples};
+    if (context.is_cancelled()) return cancelled_error();
+    auto after = edited(rest, state, edit.params, field, ResamplingEffort::kExact, context);
+    if (!after) return after.error();
+    state = std::move(after).value();
+  }
+  return state;
 }
 
 }  // namespace pointwright::server

@@ -1,6 +1,7 @@
 #pragma once
 // A recipe played on a preview, without a session: what it says about all other samplings of the surface.
 
+#include <cstdint>
 #include <memory>
 
 #include "engine/core/cloud.h"
@@ -9,6 +10,7 @@
 #include "engine/transfer/transferred_edits.h"
 #include "protocol/json/recipe.h"
 #include "server/base/outcome.h"
+#include "server/sessions/surface_state.h"
 
 namespace pointwright::server {
 
@@ -20,8 +22,8 @@ struct PlayedRecipe {
   std::size_t inserted = 0;  ///< samples that resampling has inserted, less those it has collected
 };
 
-/// The builder's parameters for a recipe's levels on this cloud. Problem: kInvalidValue where no builder takes
-/// them.
+/// The builder's parameters for a recipe's levels on this cloud. Problem: kInvalidValue where no builder
+/// takes them.
 Outcome<HierarchyParams> hierarchy_for(const protocol::Recipe& recipe, const Cloud& preview,
                                        std::uint32_t neighbors);
 
@@ -33,5 +35,11 @@ Outcome<HierarchyParams> hierarchy_for(const protocol::Recipe& recipe, const Clo
 Outcome<PlayedRecipe> play_on_preview(const protocol::RecipeRequest& request,
                                       std::shared_ptr<const Cloud> preview, const HierarchyParams& params,
                                       const ExecutionContext& context);
+
+/// The script's edits on levels of the cloud's own, with the preview's regions: volumes, whatever the
+/// sampling.
+/// Errors: those of building and editing
+Result<SurfaceState> edit_directly(const EditScript& script, std::shared_ptr<const Cloud> cloud,
+                                   const HierarchyParams& params, const ExecutionContext& context);
 
 }  // namespace pointwright::server

@@ -24,7 +24,7 @@ Agreement agreement(const Cloud& cloud, std::uint64_t preview_samples, const Hie
   EditParams single_edit = edit;
   single_edit.level = static_cast<std::uint32_t>(params.scales.size());
   const PlayedPreview single = played(oriented, params, {single_edit}, paint, &regions);
-  const TransferredSamples made = transferred(preview.script, oriented);
+  const Transferred made = transferred(preview.script, oriented);
   return {.preview = rms_distance(made.surface.finest().position, direct.surface.finest().position),
           .effect = rms_distance(single.surface.finest().position, direct.surface.finest().position)};
 }

@@ -105,11 +105,16 @@ inline PlayedPreview played(const Cloud& cloud, const HierarchyParams& params,
   return preview;
 }
 
-inline TransferredSamples transferred(const EditScript& script, const Cloud& cloud) {
+struct Transferred : TransferredSamples {
+  MultiresSurface rest;  ///< before the first edit
+};
+inline Transferred transferred(const EditScript& script, const Cloud& cloud) {
   const AnchorIndex anchors(script.rest);
-  auto made = transfer_edits(script, anchors, std::make_shared<const Cloud>(cloud), {});
+  Transferred result;
+  auto made = transfer_edits(script, anchors, std::make_shared<const Cloud>(cloud), {}, &result.rest);
   REQUIRE(made.ok());
-  return std::move(made).value();
+  static_cast<TransferredSamples&>(result) = std::move(made).value();
+  return result;
 }
 
 /// `count` evenly spaced samples of the cloud.

@@ -26,7 +26,7 @@ TEST_CASE("the preview's own samples come out to the bit, levels that are derive
   for (const auto& edits :
        {bends(), {edit_by(Twist{.axis = Vec3d::UnitX(), .angle_rad = 2.0, .length = 2.0})}}) {
     const PlayedPreview preview = played(cloud, kTwoBands, edits, beside(0.3F));
-    const TransferredSamples made = transferred(preview.script, cloud);
+    const Transferred made = transferred(preview.script, cloud);
     CHECK(same_bytes(made.rest, preview.rest));
     CHECK(same_bytes(made.surface, preview.surface));
     CHECK(!same_bytes(made.surface.finest().position, made.rest.finest().position));
@@ -39,7 +39,7 @@ TEST_CASE("the preview's own samples are split as in the preview, to the bit, an
   stretch.resampling = ResamplingParams{};
   const PlayedPreview preview =
       played(cloud, kTwoBands, {stretch, edit_by(Translation{Vec3d(0.0, 0.3, 0.0)}, 2)}, beside(0.4F));
-  const TransferredSamples made = transferred(preview.script, cloud);
+  const Transferred made = transferred(preview.script, cloud);
   CHECK(made.sampling->size() > cloud.size() + 500);
   CHECK(same_bytes(made.surface, preview.surface));
   CHECK(made.sampling->cloud->id == preview.sampling->cloud->id);
@@ -61,7 +61,7 @@ TEST_CASE("inserted samples stay with their parents' anchors where levels are de
   next.params = edit_by(Translation{Vec3d(0.0, 0.0, 0.0)});
   next.derived = bases_of(derived.value());
   preview.script.edits.push_back(next);
-  const TransferredSamples made = transferred(preview.script, cloud);
+  const Transferred made = transferred(preview.script, cloud);
   REQUIRE(made.sampling->size() > cloud.size() + 500);
   // Every level stands within a few scales of the surface, inserted samples too.
   const float scale = derived.value().reports[0].scale;
@@ -78,7 +78,7 @@ TEST_CASE("without edits, and with edits of no amount, the scan keeps its bits")
       coarse, kTwoBands,
       {edit_by(Rotation{.axis = Vec3d::UnitY(), .angle_rad = 0.0}), edit_by(Translation{Vec3d::Zero()}, 1)},
       beside(0.3F));
-  const TransferredSamples made = transferred(zero.script, cloud);
+  const Transferred made = transferred(zero.script, cloud);
   CHECK(same_bytes(made.surface.finest().position, cloud.position));
   CHECK(same_bytes(made.surface.finest().normal, cloud.normal));
 }
@@ -90,7 +90,7 @@ TEST_CASE(
   const PlayedPreview preview =
       played(preview_of(cloud, 3000), kTwoBands,
              {edit_by(Rotation{.axis = Vec3d::UnitZ(), .angle_rad = angle})}, beside(0.3F));
-  const TransferredSamples made = transferred(preview.script, cloud);
+  const Transferred made = transferred(preview.script, cloud);
   const Eigen::AngleAxisd turn(angle, Vec3d::UnitZ());
   std::size_t still = 0;
   std::size_t rigid = 0;
@@ -120,7 +120,7 @@ TEST_CASE("each sheet of a thin part is decomposed against its own") {
   const auto anchors = index.anchors_of(cloud.position, cloud.normal, {});
   for (std::size_t i = 0; i < cloud.size(); ++i)
     REQUIRE(cloud.normal[i].dot(preview.script.rest.normal[anchors[i]]) > 0.0F);
-  const TransferredSamples made = transferred(preview.script, cloud);
+  const Transferred made = transferred(preview.script, cloud);
   for (std::size_t i = 0; i < cloud.size(); ++i)
     REQUIRE(made.rest.levels[0].normal[i].dot(cloud.normal[i]) > 0.9F);
 }
@@ -131,7 +131,7 @@ TEST_CASE("a scan without normals takes the preview's sides") {
   const PlayedPreview preview = played(coarse, kTwoBands, {}, beside(0.3F));
   const Points truth = cloud.normal;
   cloud.normal = Points();
-  const TransferredSamples made = transferred(preview.script, cloud);
+  const Transferred made = transferred(preview.script, cloud);
   CHECK(count_opposed(made.surface.finest().normal, truth) == 0);
 }
 
@@ -168,7 +168,7 @@ TEST_CASE("degenerate scans are legal: one sample, samples in one place, fewer t
   for (const Points& points : {from_list({Vec3f(0.1F, 0.9F, 0.2F)}), identical(40, Vec3f(0.5F, 0.8F, 0.1F)),
                                from_list({Vec3f(1.0F, 0.0F, 0.0F), Vec3f(1.0F, 0.1F, 0.0F)}),
                                from_list({Vec3f(40.0F, 0.0F, 0.0F)})}) {
-    const TransferredSamples made = transferred(preview.script, to_cloud(points));
+    const Transferred made = transferred(preview.script, to_cloud(points));
     CHECK(all_finite(made.surface.finest().position));
     CHECK(all_finite(made.surface.finest().normal));
   }

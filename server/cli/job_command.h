@@ -1,0 +1,38 @@
+#pragma once
+// `pointwright job run`: a recipe on a scan at full resolution, in this process.
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace pointwright::server {
+
+struct JobRunOptions {
+  std::string recipe;  ///< a file: a recipe, or a request with one, as POST …/recipe takes it
+  std::string input;
+  std::string output;
+  std::string preview;  ///< a cloud file; empty: made of the input
+  std::uint64_t preview_count = 100'000;
+  std::uint32_t neighbors = 10;
+  std::string mode;  ///< tiles, memory, direct; empty: tiles where that can be
+  double s = 1.0;
+  std::string timing = "sequence";
+  std::uint64_t memory_mebibytes = 1024;
+  std::string work;  ///< a folder for scratch files; empty: beside the output
+  int threads = 0;   ///< 0: all
+  bool json = false;
+  bool quiet = false;
+};
+
+/// Adds `run` to the group of job commands.
+CLI::App* add_job_run(CLI::App& group, JobRunOptions& options);
+
+/// Returns the exit status: 0, 1 where the work failed, 2 where the arguments are wrong. Progress goes to
+/// err, the report to out.
+int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err);
+
+}  // namespace pointwright::server

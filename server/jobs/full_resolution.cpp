@@ -1,0 +1,186 @@
+#include "server/jobs/full_resolution.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "engine/core/moved_cloud.h"
+#include "engine/io/cloud_io.h"
+#include "engine/spatial/kd_tree.h"
+#include "server/cli/local_file.h"
+#include "server/ingest/files.h"
+#include "server/jobs/recipe_script.h"
+#include "server/jobs/tiled_job.h"
+
+namespace pointwright::server {
+namespace {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+
+bool resamples(const protocol::RecipeRequest& request) {
+  return std::ranges::any_of(request.recipe.edits, [](const protocol::RecipeEdit& edit) {
+    return edit.edit.resampling.has_value();
+  });
+}
+
+/// What the edits made of a cloud, whichever way.
+struct Edited {
+  std::shared_ptr<const Sampling> sampling;
+  Level finest;
+};
+
+/// The cloud as edited, in its own order; normals only where it had them.
+Cloud edited_cloud(const Cloud& cloud, const Edited& edited) {
+  const bool same_samples = edited.sampling->cloud->size() == cloud.size();
+  Cloud result = moved_cloud(same_samples ? cloud : *edited.sampling->cloud, edited.finest.position,
+                             edited.finest.normal);
+  if (!cloud.has_normals()) result.normal = Points();
+  return result;
+}
+
+class MemoryJob {
+ public:
+  MemoryJob(const JobParams& params, JobMode mode, const ExecutionContext& context,
+            const JobProgress& progress)
+      : params_(params), context_(context), progress_(progress) {
+    report_.mode = mode;
+  }
+
+  Outcome<JobReport> run() {
+    const auto format = format_of_name(params_.output);
+    if (!format) return protocol::to_problem(format.error());
+    progress_("reading", 0.0);
+    auto imported =
+        read_local_cloud(params_.input, {.max_samples = std::numeric_limits<std::uint32_t>::max() - 1U},
+                         std::numeric_limits<std::uint64_t>::max());
+    if (!imported) return protocol::to_problem(imported.error());
+    const std::optional<PositionGrid> grid = imported.value().report.grid;
+    const auto cloud = std::make_shared<const Cloud>(std::move(imported.value().cloud));
+    report_.samples = cloud->size();
+    progress_("preview", 0.1);
+    auto preview = params_.preview;
+    if (preview == nullptr) {
+      auto made = preview_of(*cloud, params_.preview_count, context_);
+      if (!made) return protocol::to_problem(made.error());
+      preview = std::move(made).value();
+    }
+    report_.preview_samples = preview->size();
+    const auto levels = hierarchy_for(params_.request.recipe, *preview, params_.neighbors);
+    if (!levels.ok()) return levels.problem();
+    auto outcome = play_on_preview(params_.request, about(preview, cloud->origin), levels.value(), context_);
+    if (!outcome.ok()) return outcome.problem();
+    PlayedRecipe& played = outcome.value();
+    played.script.spacing_ratio = static_cast<float>(
+        std::min(1.0, std::sqrt(static_cast<double>(preview->size()) / static_cast<double>(cloud->size()))));
+    report_.spacing = static_cast<double>(played.script.bases.spacing * played.script.spacing_ratio);
+    progress_("edits", 0.3);
+    auto edited = edit(cloud, levels.value(), played);
+    if (!edited) return protocol::to_problem(edited.error());
+    measure(*cloud, edited.value(), played);
+    progress_("writing", 0.9);
+    const Cloud result = edited_cloud(*cloud, edited.value());
+    auto bytes = write_cloud(result, format.value(), {.grid = grid});
+    if (!bytes) return protocol::to_problem(bytes.error());
+    if (auto written = write_file_atomically(params_.output, bytes.value()); !written)
+      return protocol::to_problem(written.error());
+    progress_("done", 1.0);
+    return report_;
+  }
+
+ private:
+  /// The preview about another origin.
+  static std::shared_ptr<const Cloud> about(std::shared_ptr<const Cloud> preview, const Vec3d& origin) {
+    if (preview->origin == origin) return preview;
+    auto moved = std::make_shared<Cloud>(*preview);
+    for (std::size_t i = 0; i < moved->size(); ++i)
+      moved->position.set(i, Vec3d(model_position(*preview, i) - origin).cast<float>());
+    moved->origin = origin;
+    moved->exact_position.clear();
+    return moved;
+  }
+
+  Result<Edited> edit(const std::shared_ptr<const Cloud>& cloud, const HierarchyParams& levels,
+                      const PlayedRecipe& played) const {
+    if (report_.mode == JobMode::kDirect) {
+      auto state = edit_directly(played.script, cloud, levels, context_);
+      if (!state) return state.error();
+      return Edited{.sampling = state.value().samples->sampling, .finest = state.value().surface->finest()};
+    }
+    const AnchorIndex anchors(played.script.rest);
+    auto made = transfer_edits(played.script, anchors, cloud, context_);
+    if (!made) return made.error();
+    return Edited{.sampling = std::move(made.value().sampling),
+                  .finest = std::move(made.value().surface.levels.back())};
+  }
+
+  /// Samples that moved and that were inserted; how far the preview's came apart from the same ones here.
+  void measure(const Cloud& cloud, const Edited& edited, const PlayedRecipe& played) {
+    const std::vector<std::uint32_t>& ids = edited.sampling->cloud->id;
+    const std::size_t kept = std::min(cloud.size(), ids.size());
+    // What was there before comes first, in its order; what was collected is missing.
+    std::vector<std::uint32_t> place(cloud.size(), kNoParent);
+    const std::size_t uploaded = edited.sampling->next_id;
+    std::vector<std::uint32_t> by_id(uploaded, kNoParent);
+    for (std::size_t i = 0; i < ids.size(); ++i) by_id[ids[i]] = static_cast<std::uint32_t>(i);
+    for (std::size_t i = 0; i < cloud.size(); ++i) place[i] = by_id[cloud.id[i]];
+    report_.inserted = ids.size() - kept;
+    for (std::size_t i = 0; i < cloud.size(); ++i)
+      if (place[i] != kNoParent && edited.finest.position[place[i]] != cloud.position[i]) ++report_.moved;
+    const KdTree tree(cloud.position);
+    DifferenceSum differences;
+    std::vector<Neighbor> found;
+    for (std::size_t a = 0; a < played.rest.size(); ++a) {
+      tree.nearest(played.rest[a], 1, found);
+      const std::uint32_t i = found.front().index;
+      if (place[i] == kNoParent ||
+          std::sqrt(static_cast<double>(found.front().distance_sq)) > report_.spacing)
+        continue;
+      const Vec3f here = edited.finest.position[place[i]] - cloud.position[i];
+      differences.add(static_cast<double>((here - (played.result[a] - played.rest[a])).norm()));
+    }
+    differences.report(report_);
+  }
+
+  const JobParams& params_;
+  const ExecutionContext& context_;
+  const JobProgress& progress_;
+  JobReport report_;
+};
+
+}  // namespace
+
+Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionContext& context,
+                                       const JobProgress& progress) {
+  const bool splits = resamples(params.request);
+  const bool same_file =
+      std::filesystem::exists(params.output) && std::filesystem::equivalent(params.input, params.output);
+  if (same_file)
+    return Problem{.kind = ProblemKind::kInvalidValue, .detail = "a job does not write over its own input"};
+  if (params.mode && *params.mode != JobMode::kTiles)
+    return MemoryJob(params, *params.mode, context, progress).run();
+  if (splits && params.mode)
+    return Problem{.kind = ProblemKind::kInvalidValue,
+                   .detail = "edits with resampling are not made in tiles: use the mode memory or direct"};
+  if (splits) return MemoryJob(params, JobMode::kMemory, context, progress).run();
+  auto file = MappedFile::open(params.input);
+  if (!file) return protocol::to_problem(file.error());
+  auto records = ScanRecords::of(file.value().bytes());
+  if (!records) return protocol::to_problem(records.error());
+  const auto wanted = format_of_name(params.output);
+  if (!wanted) return protocol::to_problem(wanted.error());
+  const bool fits = records.value().has_value() && records.value()->format == wanted.value();
+  if (fits) return run_tiles(params, file.value(), *records.value(), context, progress);
+  if (!params.mode) return MemoryJob(params, JobMode::kMemory, context, progress).run();
+  return Problem{
+      .kind = ProblemKind::kUnsupportedFormat,
+      .detail =
+          "in tiles are read binary PLY, whose vertices have no lists, and LAS, and written as what "
+          "they were: use the mode memory"};
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,69 @@
+#pragma once
+// A recipe on a scan at full resolution: through a preview, tile by tile where the scan is large (§6,
+// Figure 11).
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "engine/core/cloud.h"
+#include "engine/core/execution_context.h"
+#include "protocol/json/recipe.h"
+#include "server/base/outcome.h"
+
+namespace pointwright::server {
+
+enum class JobMode {
+  kTiles,   ///< binary PLY and LAS: in tiles, in bounded memory, whatever the size
+  kMemory,  ///< every format, and with resampling: the whole scan at once
+  kDirect,  ///< the same, on levels of the scan's own at full resolution, with the preview's regions
+};
+
+struct JobParams {
+  std::string input;
+  std::string output;  ///< its name says the format; in tiles, that of the input
+  /// Scratch files, and what a job that was interrupted goes on from; made where it is not there.
+  std::string folder;
+  protocol::RecipeRequest request;
+  /// What the recipe is played on; null: made of the scan, `preview_count` evenly spaced samples of it.
+  std::shared_ptr<const Cloud> preview;
+  std::uint64_t preview_count = 100'000;
+  std::uint32_t neighbors = 10;
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30U;
+  /// None: in tiles where the format and the recipe allow it.
+  std::optional<JobMode> mode;
+};
+
+/// What was done. Lengths are in model units.
+struct JobReport {
+  JobMode mode = JobMode::kTiles;
+  std::uint64_t samples = 0;
+  std::uint64_t moved = 0;     ///< samples that came out otherwise than they went in
+  std::uint64_t inserted = 0;  ///< by resampling
+  std::uint64_t tiles = 0;
+  std::uint64_t tiles_kept = 0;  ///< of those, done before by a job that was interrupted
+  std::uint64_t preview_samples = 0;
+  /// Between what the preview showed and what was made of the same samples: of `matched` of them.
+  std::uint64_t matched = 0;
+  double rms_difference = 0.0;
+  double max_difference = 0.0;
+  double spacing = 0.0;  ///< the scan's typical one, to compare them with
+};
+
+/// Where a job stands; called between phases and tiles.
+using JobProgress = std::function<void(const std::string& phase, double fraction)>;
+
+/// Runs the job to its end. The output appears whole or not at all. In tiles a job that was interrupted
+/// goes on where it was, where its folder, its input and its recipe are the same; the folder is removed in
+/// the end.
+/// Problems:    those of reading the input, of play_on_preview and of writing; kCancelled
+/// Promises:    samples that no edit moved keep their bytes; a recipe without effect gives the input's bytes
+/// Cost:        two passes over the input, 32 bytes of disk a sample and as many for each that moves
+/// Determinism: the same bytes for any number of threads; memory_bytes, which says how large tiles are, may
+///              change what a tile's neighbours at its border are taken to be
+Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionContext& context,
+                                       const JobProgress& progress);
+
+}  // namespace pointwright::server

@@ -1,0 +1,99 @@
+#pragma once
+// A scan's samples on disk, tile by tile, and what became of them.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/core/cloud.h"
+#include "engine/core/execution_context.h"
+#include "engine/core/result.h"
+#include "server/jobs/mapped_file.h"
+#include "server/jobs/scan_records.h"
+#include "server/jobs/tile_cuts.h"
+
+namespace pointwright::server {
+
+/// A sample in a tile, or where it came to stand. Native layout: these files never leave the machine's job.
+struct TileSample {
+  std::uint64_t index = 0;          ///< in the scan
+  std::array<float, 3> position{};  ///< relative to the script's origin
+  std::array<float, 3> normal{};    ///< zero where the scan has none
+};
+static_assert(sizeof(TileSample) == 32);
+
+/// A sample of the preview that stands where one of the scan does, or nearly, and how far the two came apart.
+struct PreviewMatch {
+  std::uint32_t anchor = 0;
+  float rest_distance = 0.0F;  ///< model units, before the edits
+  float difference = 0.0F;     ///< of what the edits did to each, model units
+};
+static_assert(sizeof(PreviewMatch) == 12);
+
+/// What the edits made of one tile.
+struct TileResult {
+  std::vector<TileSample> moved;      ///< samples that came out otherwise than they went in, by index
+  std::vector<PreviewMatch> matches;  ///< by anchor
+};
+
+/// The samples that one tile's work needs.
+struct TileInput {
+  std::shared_ptr<const Cloud> cloud;  ///< own samples and those around them, in coherent order
+  std::vector<std::uint64_t> index;    ///< in the scan, of each
+  std::vector<std::uint8_t> is_own;    ///< of each
+  std::size_t own = 0;
+};
+
+/// In a folder of its own. One process writes it.
+class TileStore {
+ public:
+  /// `origin`: what positions in tiles are relative to.
+  TileStore(std::string folder, TileCuts cuts, const Vec3d& origin);
+
+  /// Whether sort() has come to its end in this folder before.
+  [[nodiscard]] bool is_sorted();
+  /// One pass over the scan: every sample into its tile.
+  /// Errors: kTooLarge (the disk is full; field "path"), kInvalidArgument (it cannot be written), kCancelled
+  /// Cost:   32 bytes of disk and as much of memory for 2^21 samples
+  Result<void> sort(const MappedFile& file, const ScanRecords& records, const ExecutionContext& context);
+
+  [[nodiscard]] std::size_t tile_count() const { return cuts_.tile_count(); }
+  [[nodiscard]] std::uint64_t sample_count(std::size_t tile) const;
+
+  /// The tile's samples and those of other tiles within `rings` neighbourhoods of `neighbors` samples around
+  /// them. Errors: kInvalidArgument (cannot be read)
+  [[nodiscard]] Result<TileInput> load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
+                                       bool has_normals) const;
+
+  [[nodiscard]] bool has_result(std::size_t tile) const;
+  /// On the disk once it returns. Errors: those of write_file_atomically
+  Result<void> put_result(std::size_t tile, const TileResult& result) const;
+  [[nodiscard]] std::string result_path(std::size_t tile) const;
+
+ private:
+  struct Extent {
+    std::uint64_t first = 0;  // in the spool, in samples
+    std::uint64_t count = 0;
+  };
+  Result<void> read_samples(std::size_t tile, std::vector<TileSample>& samples) const;
+  [[nodiscard]] std::vector<std::byte> index_bytes() const;
+  bool read_index();
+
+  std::string folder_;
+  TileCuts cuts_;
+  Vec3d origin_;
+  std::vector<std::vector<Extent>> extents_;  // of each tile
+};
+
+/// A tile's result as its file has it; views, valid while the bytes are.
+struct TileResultView {
+  std::span<const TileSample> moved;
+  std::span<const PreviewMatch> matches;
+};
+/// Error: kMalformedData
+Result<TileResultView> view_result(std::span<const std::byte> bytes);
+
+}  // namespace pointwright::server

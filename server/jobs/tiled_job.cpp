@@ -1,0 +1,398 @@
+#include "server/jobs/tiled_job.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "engine/core/parallel.h"
+#include "engine/simplification/subsample.h"
+#include "server/base/sha256.h"
+#include "server/ingest/files.h"
+#include "server/jobs/recipe_script.h"
+#include "server/jobs/scan_survey.h"
+#include "server/jobs/tile_store.h"
+
+namespace pointwright::server {
+namespace {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+
+/// What a tile's samples and those around them take while they are edited, for each band and for all.
+constexpr std::uint64_t kBytesOfSample = 360;
+constexpr std::uint64_t kBytesOfBand = 90;
+/// Of the memory, what preview, buffers and the program itself may take.
+constexpr double kShareOfTiles = 0.6;
+/// Samples around a tile, by its own: a guess that the share above leaves room for.
+constexpr double kAround = 1.5;
+constexpr std::uint64_t kCandidates = 5;  // for each sample of the preview
+constexpr std::uint64_t kLeastSurveyed = 200'000;
+constexpr std::uint64_t kWriteChunk = std::uint64_t{1} << 20U;  // samples
+
+Problem io_problem(const std::string& path, const char* what) {
+  const bool full = errno == ENOSPC || errno == EDQUOT;
+  return Problem{.kind = full ? ProblemKind::kOutOfDisk : ProblemKind::kStorageFailed,
+                 .detail = path + ": " + what + ": " + std::strerror(errno)};
+}
+
+/// Neighbourhoods around a sample that its own outcome depends on.
+std::uint32_t rings_of(const EditScript& script) {
+  const auto bands = static_cast<std::uint32_t>(script.bases.bands.size());
+  std::uint32_t rings = 1;
+  for (const TransferredEdit& edit : script.edits) rings += bands - edit.params.level + 1;
+  return rings;
+}
+
+class TiledJob {
+ public:
+  TiledJob(const JobParams& params, const MappedFile& file, const ScanRecords& records,
+           const ExecutionContext& context, const JobProgress& progress)
+      : params_(params), file_(file), records_(records), context_(context), progress_(progress) {}
+
+  Outcome<JobReport> run() {
+    report_.samples = records_.count;
+    if (auto problem = look()) return *problem;
+    if (auto problem = check_disk()) return *problem;
+    if (auto problem = play()) return *problem;
+    if (auto problem = sort()) return *problem;
+    if (auto problem = edit_tiles()) return *problem;
+    if (auto problem = write()) return *problem;
+    std::error_code ignored;
+    std::filesystem::remove_all(params_.folder, ignored);
+    progress_("done", 1.0);
+    return report_;
+  }
+
+ private:
+  std::optional<Problem> look() {
+    progress_("survey", 0.0);
+    std::error_code error;
+    std::filesystem::create_directories(params_.folder, error);
+    if (error)
+      return Problem{.kind = ProblemKind::kStorageFailed, .detail = params_.folder + ": " + error.message()};
+    const std::uint64_t wanted = std::max(kCandidates * params_.preview_count, kLeastSurveyed);
+    auto found = survey(file_, records_, wanted, context_);
+    if (!found) return protocol::to_problem(found.error());
+    surveyed_ = std::move(found).value();
+    candidates_ = chosen_cloud(surveyed_);
+    if (candidates_.size() == 0)
+      return Problem{.kind = ProblemKind::kInvalidValue, .detail = "the scan has no samples"};
+    return std::nullopt;
+  }
+
+  /// Room for the spool, the tiles' results and the output, before anything is written.
+  [[nodiscard]] std::optional<Problem> check_disk() const {
+    const auto room = [](const std::string& path) {
+      struct statvfs status {};
+      if (::statvfs(path.c_str(), &status) != 0) return std::uint64_t{0};
+      return static_cast<std::uint64_t>(status.f_bavail) * status.f_frsize;
+    };
+    const std::string beside = std::filesystem::path(params_.output).parent_path().string();
+    const std::uint64_t scratch = 2 * sizeof(TileSample) * records_.count;
+    const std::uint64_t output = file_.bytes().size();
+    const std::uint64_t here = room(params_.folder);
+    const std::uint64_t there = room(beside.empty() ? "." : beside);
+    if (here >= scratch + output || (here >= scratch && there >= output && here != there))
+      return std::nullopt;
+    return Problem{.kind = ProblemKind::kOutOfDisk,
+                   .detail = "the job needs " + std::to_string(scratch >> 20U) +
+                             " MiB for scratch files and " + std::to_string(output >> 20U) +
+                             " MiB for its result",
+                   .limit = static_cast<double>(std::min(here, there)),
+                   .actual = static_cast<double>(scratch + output)};
+  }
+
+  std::optional<Problem> play() {
+    progress_("preview", 0.05);
+    preview_ = params_.preview;
+    if (preview_ == nullptr) {
+      auto made = preview_of(candidates_, params_.preview_count, context_);
+      if (!made) return protocol::to_problem(made.error());
+      preview_ = std::move(made).value();
+    }
+    report_.preview_samples = preview_->size();
+    const auto levels = hierarchy_for(params_.request.recipe, *preview_, params_.neighbors);
+    if (!levels.ok()) return levels.problem();
+    auto played = play_on_preview(params_.request, preview_, levels.value(), context_);
+    if (!played.ok()) return played.problem();
+    played_ = std::move(played.value());
+    EditScript& script = played_.script;
+    script.spacing_ratio = static_cast<float>(std::min(
+        1.0, std::sqrt(static_cast<double>(preview_->size()) / static_cast<double>(records_.count))));
+    report_.spacing = static_cast<double>(script.bases.spacing * script.spacing_ratio);
+    rings_ = rings_of(script);
+    return std::nullopt;
+  }
+
+  /// What a folder's files belong to.
+  [[nodiscard]] std::string identity(std::uint64_t most) const {
+    Digest hash(Digest::Algorithm::kSha256);
+    const auto add = [&](const void* data, std::size_t size) {
+      hash.add(std::span(static_cast<const std::byte*>(data), size));
+    };
+    const auto add_points = [&](const Points& points) {
+      for (const float* column : {points.x(), points.y(), points.z()})
+        add(column, points.size() * sizeof(float));
+    };
+    const std::array<std::uint64_t, 4> numbers{records_.count, most, params_.neighbors, rings_};
+    add(numbers.data(), sizeof numbers);
+    add(&surveyed_.min, sizeof(Vec3d));
+    add(&surveyed_.max, sizeof(Vec3d));
+    for (const Vec3d& p : surveyed_.position) add(&p, sizeof p);
+    for (const Vec3f& n : surveyed_.normal) add(&n, sizeof n);
+    add_points(played_.rest);
+    add_points(played_.result);
+    for (const TransferredEdit& edit : played_.script.edits) {
+      const std::array<std::uint64_t, 3> head{edit.params.level, edit.regions.zero.size(),
+                                              edit.regions.one.size()};
+      add(head.data(), sizeof head);
+    }
+    return to_hex(hash.finish());
+  }
+
+  std::optional<Problem> sort() {
+    progress_("tiles", 0.1);
+    const std::uint64_t bytes_each = kBytesOfSample + kBytesOfBand * played_.script.bases.bands.size();
+    const double room = kShareOfTiles * static_cast<double>(params_.memory_bytes);
+    const auto most =
+        static_cast<std::uint64_t>(std::max(4096.0, room / kAround / static_cast<double>(bytes_each)));
+    const double share = static_cast<double>(candidates_.size()) / static_cast<double>(records_.count);
+    const auto most_candidates = static_cast<std::size_t>(std::max(1.0, share * static_cast<double>(most)));
+    // Candidates may stand about another origin than the preview that was given.
+    Points candidates(candidates_.size());
+    const Vec3d offset = candidates_.origin - played_.script.origin;
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      candidates.set(i, (candidates_.position[i].cast<double>() + offset).cast<float>());
+    store_.emplace(params_.folder, TileCuts(candidates, most_candidates), played_.script.origin);
+    candidates_ = {};
+    report_.tiles = store_->tile_count();
+
+    const std::string marker = params_.folder + "/job.id";
+    const std::string id = identity(most);
+    const auto kept = read_file(marker, 1024);
+    const auto as_bytes_of = [](const std::string& text) {
+      return std::as_bytes(std::span(text.data(), text.size()));
+    };
+    const bool same = kept && std::ranges::equal(kept.value(), as_bytes_of(id));
+    if (same && store_->is_sorted()) return std::nullopt;
+    for (const auto& entry : std::filesystem::directory_iterator(params_.folder))
+      if (entry.path().extension() == ".result") std::filesystem::remove(entry.path());
+    if (auto sorted = store_->sort(file_, records_, context_); !sorted)
+      return protocol::to_problem(sorted.error());
+    if (auto marked = write_file_atomically(marker, as_bytes_of(id)); !marked)
+      return protocol::to_problem(marked.error());
+    return std::nullopt;
+  }
+
+  std::optional<Problem> edit_tiles() {
+    const AnchorIndex anchors(played_.script.rest);
+    std::uint64_t done = 0;
+    for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
+      progress_("tile " + std::to_string(tile + 1) + " of " + std::to_string(store_->tile_count()),
+                0.2 + 0.7 * static_cast<double>(done) / static_cast<double>(records_.count));
+      done += store_->sample_count(tile);
+      if (store_->has_result(tile)) {
+        ++report_.tiles_kept;
+        continue;
+      }
+      if (store_->sample_count(tile) == 0) continue;
+      if (context_.is_cancelled()) return protocol::to_problem(cancelled_error());
+      auto input = store_->load(tile, rings_, params_.neighbors, records_.has_normals());
+      if (!input) return protocol::to_problem(input.error());
+      const std::shared_ptr<const Cloud> cloud = input.value().cloud;
+      auto made = transfer_edits(played_.script, anchors, cloud, context_);
+      if (!made) return protocol::to_problem(made.error());
+      if (auto put = store_->put_result(tile, result_of(input.value(), made.value())); !put)
+        return protocol::to_problem(put.error());
+    }
+    return std::nullopt;
+  }
+
+  [[nodiscard]] TileResult result_of(const TileInput& input, const TransferredSamples& made) const {
+    TileResult result;
+    const Level& now = made.surface.finest();
+    const Points& before = input.cloud->position;
+    const Points& normals = input.cloud->normal;
+    std::vector<PreviewMatch> best;
+    std::vector<std::uint32_t> order;
+    for (std::uint32_t i = 0; i < input.index.size(); ++i)
+      if (input.is_own[i] != 0) order.push_back(i);
+    std::sort(order.begin(), order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return input.index[a] < input.index[b]; });
+    for (const std::uint32_t i : order) {
+      const Vec3f p = now.position[i];
+      // Normals that are no directions stay as they are where the sample does.
+      const bool moved = p != before[i] || (records_.has_normals() && turned(normals[i], now.normal[i]));
+      if (moved) {
+        const Vec3f n = now.normal[i];
+        result.moved.push_back(
+            {.index = input.index[i], .position = {p.x(), p.y(), p.z()}, .normal = {n.x(), n.y(), n.z()}});
+      }
+      const std::uint32_t anchor = made.anchor[i];
+      const float rest = (before[i] - played_.rest[anchor]).norm();
+      const Vec3f apart = (p - before[i]) - (played_.result[anchor] - played_.rest[anchor]);
+      best.push_back({.anchor = anchor, .rest_distance = rest, .difference = apart.norm()});
+    }
+    std::stable_sort(best.begin(), best.end(), [](const PreviewMatch& a, const PreviewMatch& b) {
+      return a.anchor != b.anchor ? a.anchor < b.anchor : a.rest_distance < b.rest_distance;
+    });
+    for (const PreviewMatch& match : best)
+      if (result.matches.empty() || result.matches.back().anchor != match.anchor)
+        result.matches.push_back(match);
+    return result;
+  }
+
+  /// Whether an edit has turned the normal: what import makes of a length that is not 1 is no turn.
+  static bool turned(const Vec3f& before, const Vec3f& after) {
+    if (before == after) return false;
+    const float length = before.norm();
+    return !(length > 1e-6F) || !std::isfinite(length) ? false : Vec3f(before / length) != after;
+  }
+
+  std::optional<Problem> write() {
+    progress_("result", 0.9);
+    std::vector<MappedFile> files;
+    std::vector<std::span<const TileSample>> moved;
+    std::vector<PreviewMatch> best(played_.rest.size(), {.rest_distance = std::numeric_limits<float>::max()});
+    for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
+      if (!store_->has_result(tile)) continue;
+      auto file = MappedFile::open(store_->result_path(tile));
+      if (!file) return protocol::to_problem(file.error());
+      files.push_back(std::move(file).value());
+      auto view = view_result(files.back().bytes());
+      if (!view) return protocol::to_problem(view.error());
+      moved.push_back(view.value().moved);
+      report_.moved += view.value().moved.size();
+      for (const PreviewMatch& match : view.value().matches)
+        if (match.anchor < best.size() && match.rest_distance < best[match.anchor].rest_distance)
+          best[match.anchor] = match;
+    }
+    DifferenceSum differences;
+    for (const PreviewMatch& match : best)
+      if (static_cast<double>(match.rest_distance) <= report_.spacing)
+        differences.add(static_cast<double>(match.difference));
+    differences.report(report_);
+
+    const std::string path = params_.output + ".part";
+    const int out = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (out < 0) return io_problem(path, "cannot be written");
+    auto problem = write_records(out, path, moved);
+    if (!problem && ::fsync(out) != 0) problem = io_problem(path, "cannot be brought to the disk");
+    ::close(out);
+    if (!problem && ::rename(path.c_str(), params_.output.c_str()) != 0)
+      problem = io_problem(params_.output, "cannot be named");
+    if (problem) {
+      ::unlink(path.c_str());
+      return problem;
+    }
+    const std::string beside = std::filesystem::path(params_.output).parent_path().string();
+    sync_folder(beside.empty() ? "." : beside);
+    return std::nullopt;
+  }
+
+  std::optional<Problem> write_records(int out, const std::string& path,
+                                       std::vector<std::span<const TileSample>>& moved) {
+    const auto put = [&](std::span<const std::byte> bytes) -> std::optional<Problem> {
+      if (!write_all(out, bytes)) return io_problem(path, "cannot be written");
+      return std::nullopt;
+    };
+    const std::span<const std::byte> bytes = file_.bytes();
+    if (auto problem = put(bytes.first(static_cast<std::size_t>(records_.begin)))) return problem;
+    std::vector<std::byte> chunk;
+    std::vector<std::uint8_t> unsaid(moved.size());
+    for (std::uint64_t begin = 0; begin < records_.count; begin += kWriteChunk) {
+      if (context_.is_cancelled()) return protocol::to_problem(cancelled_error());
+      progress_("result", 0.9 + 0.1 * static_cast<double>(begin) / static_cast<double>(records_.count));
+      const std::uint64_t end = std::min(records_.count, begin + kWriteChunk);
+      const std::uint64_t from = records_.begin + begin * records_.record_bytes;
+      const std::uint64_t to = records_.begin + end * records_.record_bytes;
+      chunk.assign(bytes.begin() + static_cast<std::ptrdiff_t>(from),
+                   bytes.begin() + static_cast<std::ptrdiff_t>(to));
+      // Tiles share no sample, so they can be put in side by side.
+      parallel_for(
+          moved.size(),
+          [&](std::size_t first, std::size_t last) {
+            for (std::size_t tile = first; tile < last; ++tile) {
+              std::span<const TileSample>& left = moved[tile];
+              for (; !left.empty() && left.front().index < end; left = left.subspan(1))
+                unsaid[tile] |= static_cast<std::uint8_t>(!replace(left.front(), chunk.data(), begin));
+            }
+          },
+          1);
+      if (std::ranges::find(unsaid, std::uint8_t{1}) != unsaid.end())
+        return Problem{.kind = ProblemKind::kInvalidValue,
+                       .detail =
+                           "the edits take samples to where the file's whole numbers cannot say them: the "
+                           "mode memory chooses a grid that can, and so does PLY"};
+      if (auto problem = put(chunk)) return problem;
+      file_.release(from, to);
+    }
+    return put(bytes.subspan(static_cast<std::size_t>(records_.end())));
+  }
+
+  /// False: the record cannot say the place.
+  bool replace(const TileSample& sample, std::byte* chunk, std::uint64_t begin) const {
+    if (sample.index < begin) return false;  // a damaged result
+    std::byte* const record = chunk + (sample.index - begin) * records_.record_bytes;
+    const Vec3f p(sample.position[0], sample.position[1], sample.position[2]);
+    const Vec3d place = played_.script.origin + p.cast<double>();
+    if (!records_.can_say(place)) return false;
+    records_.set_position(record, place);
+    if (records_.has_normals())
+      records_.set_normal(record, {sample.normal[0], sample.normal[1], sample.normal[2]});
+    return true;
+  }
+
+  const JobParams& params_;
+  const MappedFile& file_;
+  const ScanRecords& records_;
+  const ExecutionContext& context_;
+  const JobProgress& progress_;
+  JobReport report_;
+  ScanSurvey surveyed_;
+  Cloud candidates_;
+  std::shared_ptr<const Cloud> preview_;
+  PlayedRecipe played_;
+  std::uint32_t rings_ = 1;
+  std::optional<TileStore> store_;
+};
+
+}  // namespace
+
+Outcome<JobReport> run_tiles(const JobParams& params, const MappedFile& file, const ScanRecords& records,
+                             const ExecutionContext& context, const JobProgress& progress) {
+  return TiledJob(params, file, records, context, progress).run();
+}
+
+void DifferenceSum::add(double difference) {
+  ++count_;
+  squares_ += difference * difference;
+  greatest_ = std::max(greatest_, difference);
+}
+
+void DifferenceSum::report(JobReport& report) const {
+  report.matched = count_;
+  report.rms_difference = count_ > 0 ? std::sqrt(squares_ / static_cast<double>(count_)) : 0.0;
+  report.max_difference = greatest_;
+}
+
+Result<std::shared_ptr<const Cloud>> preview_of(const Cloud& cloud, std::uint64_t count,
+                                                const ExecutionContext& context) {
+  if (cloud.size() <= count) return std::shared_ptr<const Cloud>(std::make_shared<const Cloud>(cloud));
+  auto chosen = subsample(cloud.position, cloud.normal, {.target = KeepCount{count}}, &context);
+  if (!chosen) return chosen.error();
+  return std::shared_ptr<const Cloud>(std::make_shared<const Cloud>(permuted(cloud, chosen.value())));
+}
+
+}  // namespace pointwright::server

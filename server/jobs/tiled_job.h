@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+// The tiles of a job: from records to records, in bounded memory.
+
+#include "server/jobs/full_resolution.h"
+#include "server/jobs/mapped_file.h"
+#include "server/jobs/scan_records.h"
+
+namespace pointwright::server {
+
+/// JobMode::kTiles.
+Outcome<JobReport> run_tiles(const JobParams& params, const MappedFile& file, const ScanRecords& records,
+                             const ExecutionContext& context, const JobProgress& progress);
+
+/// Root mean square and greatest of what came apart, into the report.
+class DifferenceSum {
+ public:
+  void add(double difference);
+  void report(JobReport& report) const;
+
+ private:
+  std::uint64_t count_ = 0;
+  double squares_ = 0.0;
+  double greatest_ = 0.0;
+};
+
+/// `count` evenly spaced samples of the cloud; the cloud itself where it has no more. Errors: kCancelled
+Result<std::shared_ptr<const Cloud>> preview_of(const Cloud& cloud, std::uint64_t count,
+                                                const ExecutionContext& context);
+
+}  // namespace pointwright::server

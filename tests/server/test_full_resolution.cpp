@@ -1,0 +1,334 @@
+// Jobs: a recipe on scan files, in tiles and otherwise.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "engine/core/parallel.h"
+#include "engine/io/cloud_io.h"
+#include "protocol/json/parse.h"
+#include "server/ingest/files.h"
+#include "server/jobs/full_resolution.h"
+#include "tests/server/synthetic.h"
+#include "tests/server/temporary_folder.h"
+
+using namespace pointwright;
+using namespace pointwright::server;
+using namespace pointwright::test;
+using protocol::ProblemKind;
+
+namespace {
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void put(const std::string& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+void put(const std::string& path, const Cloud& cloud, CloudFormat format = CloudFormat::kPly,
+         const ExportParams& params = {}) {
+  const auto bytes = write_cloud(cloud, format, params);
+  REQUIRE(bytes.ok());
+  REQUIRE(write_file_atomically(path, bytes.value()).ok());
+}
+
+Cloud cloud_of(const std::string& path) {
+  const auto bytes = read_file(path);
+  REQUIRE(bytes.ok());
+  const auto format = detect_format(bytes.value());
+  REQUIRE(format.ok());
+  auto read = read_cloud(bytes.value(), format.value(), {});
+  REQUIRE(read.ok());
+  return in_caller_order(read.value().cloud);
+}
+
+/// Lifts the right of the sheet on level 0, then turns it on level 1; its left stays.
+protocol::RecipeRequest lifting(std::size_t edits = 2) {
+  protocol::RecipeRequest request;
+  request.recipe.level_scales = {0.11, 0.05, 0.0};
+  protocol::RecipeEdit edit{.paints = true, .zero = {left_of(0.3)}, .one = {right_of(0.7)}};
+  edit.edit.deformation.steps = {Translation{.vector = {0.0, 0.05, 0.3}}};
+  if (edits > 0) request.recipe.edits.push_back(edit);
+  edit.edit.level = 1;
+  edit.edit.deformation.steps = {
+      Rotation{.point = Vec3d(0.7, 0.5, 0.3), .axis = {0, 1, 0}, .angle_rad = protocol::to_radians(25.0)}};
+  if (edits > 1) request.recipe.edits.push_back(edit);
+  return request;
+}
+
+struct JobFolder {
+  TemporaryFolder folder;
+  std::string in = folder / "in.ply";
+  std::string out = folder / "out.ply";
+
+  [[nodiscard]] JobParams params(std::size_t edits = 2) const {
+    return {.input = in,
+            .output = out,
+            .folder = folder / "job",
+            .request = lifting(edits),
+            .preview = nullptr,
+            .preview_count = 2500,
+            .neighbors = 10,
+            .memory_bytes = std::uint64_t{1} << 20U,
+            .mode = {}};
+  }
+  JobReport run(const JobParams& params) const {
+    const auto report = run_full_resolution(params, ExecutionContext(), [](const std::string&, double) {});
+    REQUIRE_MESSAGE(report.ok(), (report.ok() ? "" : report.problem().detail));
+    CHECK_FALSE(std::filesystem::exists(params.folder));
+    return report.value();
+  }
+  protocol::Problem refused(const JobParams& params) const {
+    const auto report = run_full_resolution(params, ExecutionContext(), [](const std::string&, double) {});
+    REQUIRE_FALSE(report.ok());
+    CHECK_FALSE(std::filesystem::exists(params.output));
+    return report.problem();
+  }
+};
+
+/// Big-endian, doubles, properties in an odd order and of other types, normals, a face and bytes after it.
+std::string odd_ply(std::size_t side) {
+  std::string text =
+      "ply\nformat binary_big_endian 1.0\ncomment kept\nelement vertex " + std::to_string(side * side) +
+      "\nproperty uchar flag\nproperty double z\nproperty float nx\nproperty float ny\nproperty float nz\n"
+      "property double x\nproperty double y\nproperty short tail\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  const auto append = [&](auto value) {
+    std::string raw(sizeof value, '\0');
+    std::memcpy(raw.data(), &value, sizeof value);
+    text.append(raw.rbegin(), raw.rend());
+  };
+  for (std::size_t i = 0; i < side * side; ++i) {
+    const double x = static_cast<double>(i % side) / static_cast<double>(side - 1);
+    const double y = static_cast<double>(i / side) / static_cast<double>(side - 1);
+    append(static_cast<std::uint8_t>(i));
+    append(0.01 * std::sin(9.0 * x) + 1e-12 * y);
+    append(0.0F);
+    append(0.0F);
+    append(2.0F);  // not of unit length
+    append(x + 1e-13);
+    append(y);
+    append(static_cast<std::int16_t>(i * 7));
+  }
+  append(std::uint8_t{3});
+  for (const std::int32_t corner : {0, 1, 2}) append(corner);
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("a recipe without effect gives a job's input back, byte by byte, whatever the records hold") {
+  const JobFolder job;
+  put(job.in, odd_ply(60));
+  for (const std::size_t edits : {0, 2}) {
+    JobParams params = job.params(edits);
+    params.request.s = 0.0;
+    const JobReport report = job.run(params);
+    CHECK(report.mode == JobMode::kTiles);
+    CHECK(report.samples == 3600);
+    CHECK(report.moved == 0);
+    CHECK(report.matched > 2000);
+    CHECK(report.max_difference == 0.0);
+    CHECK(bytes_of(job.out) == bytes_of(job.in));
+  }
+}
+
+TEST_CASE("a job changes positions and normals of what moves, and not a byte of anything else") {
+  const JobFolder job;
+  constexpr std::size_t kSide = 120;
+  put(job.in, odd_ply(kSide));
+  const JobReport report = job.run(job.params());
+  CHECK(report.tiles > 2);
+  const std::string before = bytes_of(job.in);
+  const std::string after = bytes_of(job.out);
+  REQUIRE(before.size() == after.size());
+  const std::size_t head = before.find("end_header\n") + 11;
+  constexpr std::size_t kRecord = 1 + 8 + 12 + 16 + 2;
+  CHECK(before.substr(0, head) == after.substr(0, head));
+  CHECK(before.substr(head + kSide * kSide * kRecord) == after.substr(head + kSide * kSide * kRecord));
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < kSide * kSide; ++i) {
+    const std::string a = before.substr(head + i * kRecord, kRecord);
+    const std::string b = after.substr(head + i * kRecord, kRecord);
+    CHECK(a[0] == b[0]);
+    CHECK(a.substr(kRecord - 2) == b.substr(kRecord - 2));
+    const double x = static_cast<double>(i % kSide) / static_cast<double>(kSide - 1);
+    if (x < 0.25) CHECK(a == b);
+    if (x > 0.75) CHECK(a.substr(1, 8) != b.substr(1, 8));
+    if (a != b) ++moved;
+  }
+  CHECK(moved == report.moved);
+  // The rotation of the right side turns its normals by 25 degrees about y.
+  const Cloud made = cloud_of(job.out);
+  CHECK(std::acos(made.normal[kSide * kSide - 1].z()) ==
+        doctest::Approx(protocol::to_radians(25.0)).epsilon(0.2));
+}
+
+TEST_CASE("in tiles and in memory the same comes out, with any number of threads") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(200));
+  JobParams params = job.params();
+  params.mode = JobMode::kMemory;
+  const JobReport whole = job.run(params);
+  const Cloud expected = cloud_of(job.out);
+  CHECK(whole.rms_difference < 0.1 * whole.spacing);
+  params.mode = JobMode::kTiles;
+  std::string first;
+  for (const int threads : {1, 2, 8}) {
+    with_threads(threads, [&] {
+      const JobReport report = job.run(params);
+      CHECK(report.tiles >= 8);
+      CHECK(report.moved == whole.moved);
+    });
+    if (first.empty()) first = bytes_of(job.out);
+    CHECK(bytes_of(job.out) == first);
+  }
+  const Cloud tiled = cloud_of(job.out);
+  // The preview is another choice of samples where the file's order, not the coherent one, is surveyed.
+  double worst = 0.0;
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    worst = std::max(worst, static_cast<double>((tiled.position[i] - expected.position[i]).norm()));
+  CHECK(worst < 0.5 * whole.spacing);
+  CHECK(tiled.color == expected.color);
+}
+
+TEST_CASE("tiles leave no seam: many small ones and a single large one agree to the bit") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(200));
+  JobParams params = job.params();
+  CHECK(job.run(params).tiles >= 8);
+  const std::string many = bytes_of(job.out);
+  params.memory_bytes = std::uint64_t{1} << 30U;
+  CHECK(job.run(params).tiles == 1);
+  CHECK(bytes_of(job.out) == many);
+}
+
+TEST_CASE("a job that was interrupted goes on from its tiles, and gives the bytes of one that was not") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(200));
+  const JobParams params = job.params();
+  job.run(params);
+  const std::string undisturbed = bytes_of(job.out);
+  std::filesystem::remove(job.out);
+  for (const char* last_phase : {"tiles", "tile 4 of", "result"}) {
+    CAPTURE(last_phase);
+    const ExecutionContext context;
+    const auto report = run_full_resolution(params, context, [&](const std::string& phase, double) {
+      if (phase.starts_with(last_phase)) context.cancel();
+    });
+    REQUIRE_FALSE(report.ok());
+    CHECK_FALSE(std::filesystem::exists(job.out));
+  }
+  const JobReport report = job.run(params);
+  CHECK(report.tiles_kept == report.tiles);
+  CHECK(bytes_of(job.out) == undisturbed);
+}
+
+TEST_CASE("tiles of another recipe or another input are not taken for this job's") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(150));
+  const JobParams params = job.params();
+  const ExecutionContext context;
+  REQUIRE_FALSE(run_full_resolution(params, context, [&](const std::string& phase, double) {
+                  if (phase == "result") context.cancel();
+                }).ok());
+  JobParams other = params;
+  other.request = lifting(1);
+  CHECK(job.run(other).tiles_kept == 0);
+}
+
+TEST_CASE("LAS stays on its grid, and what its numbers cannot say is refused") {
+  const JobFolder job;
+  JobParams params = job.params();
+  params.input = job.folder / "in.las";
+  params.output = job.folder / "out.las";
+  // Whole numbers of 1/1024 leave room for what the edits do; the finest grid that holds the sheet does not.
+  Cloud sheet = wavy_sheet(120);
+  for (std::size_t i = 0; i < sheet.size(); ++i)
+    sheet.position.set(i, (sheet.position[i].array() * 1024.0F).round() / 1024.0F);
+  put(params.input, sheet, CloudFormat::kLas,
+      {.grid = PositionGrid{.scale = Vec3d::Constant(1.0 / 1024.0), .offset = Vec3d::Zero()}});
+  const JobReport report = job.run(params);
+  CHECK(report.mode == JobMode::kTiles);
+  CHECK(report.moved > 5000);
+  const Cloud before = cloud_of(params.input);
+  const Cloud after = cloud_of(params.output);
+  REQUIRE(after.size() == before.size());
+  for (std::size_t i = 0; i < before.size(); ++i)
+    if (before.position[i].x() < 0.25F) CHECK(model_position(after, i) == model_position(before, i));
+  std::filesystem::remove(params.output);
+  params.request.recipe.edits[0].edit.deformation.steps = {Translation{.vector = {0.0, 0.0, 1e8}}};
+  params.request.recipe.edits.resize(1);
+  CHECK(job.refused(params).detail.find("whole numbers") != std::string::npos);
+}
+
+TEST_CASE("other formats and resampling are made in memory, on levels of their own where asked for") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(100));
+  JobParams params = job.params();
+  params.output = job.folder / "out.drc";
+  CHECK(job.run(params).mode == JobMode::kMemory);
+  CHECK(cloud_of(params.output).size() == 10'000);
+
+  params.output = job.out;
+  params.request.recipe.edits[0].edit.deformation.steps = {Translation{.vector = {1.0, 0.0, 0.0}}};
+  params.request.recipe.edits[0].edit.resampling = ResamplingParams{};
+  const JobReport stretched = job.run(params);
+  CHECK(stretched.mode == JobMode::kMemory);
+  CHECK(stretched.inserted > 2000);
+  const Cloud made = cloud_of(job.out);
+  CHECK(made.size() == 10'000 + stretched.inserted);
+  CHECK(made.color.size() == made.size());
+
+  std::filesystem::remove(job.out);
+  params.request = lifting();
+  params.mode = JobMode::kDirect;
+  const JobReport direct = job.run(params);
+  CHECK(direct.rms_difference > 0.0);
+  CHECK(direct.rms_difference < 0.5 * direct.spacing);
+}
+
+TEST_CASE("jobs refuse what they cannot do, and leave nothing behind") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(100));
+  JobParams params = job.params();
+  params.request.recipe.edits[0].edit.resampling = ResamplingParams{};
+  params.mode = JobMode::kTiles;
+  CHECK(job.refused(params).detail.find("resampling") != std::string::npos);
+
+  params = job.params();
+  params.mode = JobMode::kTiles;
+  params.input = job.folder / "text.ply";
+  put(params.input, wavy_sheet(50), CloudFormat::kPly, {.ascii = true});
+  CHECK(job.refused(params).kind == ProblemKind::kUnsupportedFormat);
+
+  params.input = job.folder / "cut.ply";
+  put(params.input, bytes_of(job.in).substr(0, 5000));
+  CHECK(job.refused(params).kind == ProblemKind::kMalformedCloud);
+
+  std::string with_nan = odd_ply(40);
+  const std::size_t x_of_first = with_nan.find("end_header\n") + 11 + 1 + 8 + 12;
+  with_nan.replace(x_of_first, 8, std::string("\x7f\xf8\0\0\0\0\0\0", 8));
+  params.input = job.folder / "nan.ply";
+  put(params.input, with_nan);
+  const protocol::Problem not_finite = job.refused(params);
+  CHECK(not_finite.kind == ProblemKind::kNonFinite);
+  CHECK(not_finite.detail.find("sample 0") != std::string::npos);
+
+  params.input = job.folder / "absent.ply";
+  CHECK(job.refused(params).detail.find("absent.ply") != std::string::npos);
+
+  params = job.params();
+  params.request.recipe.edits[1].edit.level = 9;
+  CHECK(job.refused(params).detail.find("edit 2") != std::string::npos);
+  params = job.params();
+  params.output = params.input;
+  CHECK_FALSE(run_full_resolution(params, ExecutionContext(), [](const std::string&, double) {}).ok());
+  CHECK(cloud_of(job.in).size() == 10'000);
+}
