@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build build-tests install viewer sample demo figures serve test battery bench bench-peers sanitize tidy format check-arm64 clean
+.PHONY: help build build-tests install viewer sample demo figures serve test battery bench bench-peers sanitize fuzz tidy format check-arm64 clean
 
 release := build/release
 daemon := $(release)/server/pointwrightd
@@ -109,6 +109,12 @@ sanitize: ## C++ tests under AddressSanitizer, UndefinedBehaviorSanitizer and Th
 	  $(call compile,$$preset,all); \
 	  ctest --preset $$preset -j $(JOBS) --timeout 1800; \
 	done
+
+fuzz: ## every parser and codec under libFuzzer, ten minutes each: SECONDS=60 for less, TARGETS="ply las" for some
+	@.ci/setup build web fuzz
+	@mkdir -p build
+	@$(call compile,fuzz,all)
+	@node tests/fuzz/run.mjs --seconds $(or $(SECONDS),600) $(TARGETS)
 
 tidy: ## clang-tidy over every C++ source
 	@.ci/setup build web lint

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/core/check.h"
 #include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
 #include "engine/multires/base_point_kernels.h"
@@ -112,6 +113,12 @@ Plane plane_at(const BaseSurface& base, std::uint32_t q) {
 Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base,
                                 float spacing, const DecomposeParams& params,
                                 const ExecutionContext& context) {
+  return decompose(position, normal, base, base.counterpart, spacing, params, context);
+}
+
+Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base,
+                                std::span<const std::uint32_t> counterpart, float spacing,
+                                const DecomposeParams& params, const ExecutionContext& context) {
   if (!(params.sigma > 0.0F && params.sigma <= 100.0F)) {
     return out_of_range("sigma must lie in (0, 100]", "sigma", 100.0, static_cast<double>(params.sigma));
   }
@@ -121,6 +128,7 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
                      static_cast<double>(kMostBaseSamples), static_cast<double>(base.position.size()));
   }
   const std::size_t n = position.size();
+  POINTWRIGHT_CHECK(normal.size() == n && counterpart.size() == n, "a normal and a counterpart per sample");
   Decomposition result;
   result.base.resize(n);
   result.normal.resize(n);
@@ -139,8 +147,8 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
         PlaneFitter fitter(base, tree, params);
         BasePointWalk walk(base, params, static_cast<float>(tolerance));
         Counts& count = counts[begin / kParallelBlock];
-        std::vector<std::uint32_t> start(base.counterpart.begin() + static_cast<std::ptrdiff_t>(begin),
-                                         base.counterpart.begin() + static_cast<std::ptrdiff_t>(end));
+        std::vector<std::uint32_t> start(counterpart.begin() + static_cast<std::ptrdiff_t>(begin),
+                                         counterpart.begin() + static_cast<std::ptrdiff_t>(end));
         if (params.start == IterationStart::kNearest) {
           for (std::size_t i = begin; i < end; ++i) start[i - begin] = fitter.nearest(position[i]);
         }
@@ -161,7 +169,7 @@ Result<Decomposition> decompose(const Points& position, const Points& normal, co
           if (flipped) ++count.flipped;
           if (flipped || lost) {
             ++count.fallback;
-            found.plane = plane_at(base, base.counterpart[i]);
+            found.plane = plane_at(base, counterpart[i]);
             r = project(p, found.plane);
           }
           result.base.set(i, r.cast<float>());

@@ -2,6 +2,7 @@
 // Base points on the degree-1 moving least-squares surface by damped Newton iteration (§3.4).
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "engine/core/execution_context.h"
@@ -69,5 +70,11 @@ struct DecomposeParams {
 Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base,
                                 float spacing, const DecomposeParams& params,
                                 const ExecutionContext& context);
+
+/// The same of samples that the base was not made of: `counterpart` names a sample of Q near each one, on its
+/// side.
+Result<Decomposition> decompose(const Points& position, const Points& normal, const BaseSurface& base,
+                                std::span<const std::uint32_t> counterpart, float spacing,
+                                const DecomposeParams& params, const ExecutionContext& context);
 
 }  // namespace pointwright

@@ -8,7 +8,6 @@
 #include "engine/core/median.h"
 #include "engine/core/out_of_range.h"
 #include "engine/core/parallel.h"
-#include "engine/multires/base_surface.h"
 #include "engine/multires/decomposition.h"
 #include "engine/normals/rest_surface.h"
 
@@ -21,7 +20,7 @@ constexpr float kGreatestScaleRatio = 0.95F;
 // One band: fills `below` with the base level of `above` and returns its detail coefficients.
 Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origin, float scale, float spacing,
                                           const ExecutionContext& context, Level& below,
-                                          DecompositionReport& report) {
+                                          DecompositionReport& report, BaseSurface& kept_base) {
   if (!(scale > 0.0F)) {  // all samples coincide: the surface is its own base
     below = above;
     report.base_samples = above.position.size();
@@ -44,6 +43,7 @@ Result<std::vector<float>> decompose_band(const Level& above, const Vec3d& origi
     squares += static_cast<double>(d) * static_cast<double>(d);
   }
   report.rms_detail = static_cast<float>(std::sqrt(squares / static_cast<double>(found.detail.size())));
+  kept_base = std::move(base).value();
   below.position = std::move(found.base);
   below.normal = std::move(found.normal);
   return std::move(found.detail);
@@ -79,6 +79,7 @@ Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& par
   result.surface.levels.resize(bands + 1);
   result.surface.detail.resize(bands);
   result.reports.resize(bands);
+  result.bases.resize(bands);
   Level& finest = result.surface.levels.back();
   finest.position = cloud.position;
   auto rest = rest_surface(cloud, params.neighbors, context);
@@ -102,7 +103,7 @@ Result<Hierarchy> build_hierarchy(const Cloud& cloud, const HierarchyParams& par
     const double scale = std::sqrt(asked * asked - finer * finer);
     DecompositionReport& report = result.reports[band];
     auto detail = decompose_band(result.surface.levels[band + 1], cloud.origin, static_cast<float>(scale),
-                                 spacing, context, result.surface.levels[band], report);
+                                 spacing, context, result.surface.levels[band], report, result.bases[band]);
     if (!detail) return detail.error();
     result.surface.detail[band] = std::move(detail).value();
     variance += static_cast<double>(report.scale) * static_cast<double>(report.scale);

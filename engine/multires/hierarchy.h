@@ -7,6 +7,7 @@
 #include "engine/core/cloud.h"
 #include "engine/core/execution_context.h"
 #include "engine/core/result.h"
+#include "engine/multires/base_surface.h"
 #include "engine/multires/surface.h"
 #include "engine/spatial/neighbor_graph.h"
 
@@ -47,6 +48,9 @@ struct Hierarchy {
   NeighborGraph graph;                       ///< of the rest samples of the finest level; serves all levels
   std::vector<float> spacing;                ///< local sample spacing of the rest surface, model units
   std::vector<DecompositionReport> reports;  ///< one per band
+  /// The base surface of each band: what other samplings of the same surface are decomposed against
+  /// (engine/transfer). Without samples where all samples of the cloud coincide.
+  std::vector<BaseSurface> bases;
   /// Connected components of the neighbour graph, each of which has a side chosen for it; 0 where normals
   /// were uploaded, which choose it.
   std::size_t component_count = 0;

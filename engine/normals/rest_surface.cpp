@@ -35,6 +35,13 @@ Result<void> validate_neighbors(std::uint32_t neighbors) {
   return {};
 }
 
+Points usable_normals(const Cloud& cloud, const NeighborGraph& graph, const ExecutionContext& context) {
+  Points normal;
+  estimate_normals(cloud.position, graph, NormalParams{}, normal, &context);
+  if (context.is_cancelled() || !cloud.has_normals()) return normal;
+  return adopt_normals(cloud.normal, normal);
+}
+
 Result<RestSurface> rest_surface(const Cloud& cloud, std::uint32_t neighbors,
                                  const ExecutionContext& context) {
   if (const auto valid = validate_neighbors(neighbors); !valid) return valid.error();
@@ -46,11 +53,9 @@ Result<RestSurface> rest_surface(const Cloud& cloud, std::uint32_t neighbors,
   rest.graph = build_neighbor_graph(cloud.position, neighbors, &context);
   if (context.is_cancelled()) return cancelled_error();
   context.begin_phase("normals", 0.35);
-  estimate_normals(cloud.position, rest.graph, NormalParams{}, rest.normal, &context);
+  rest.normal = usable_normals(cloud, rest.graph, context);
   if (context.is_cancelled()) return cancelled_error();
-  if (cloud.has_normals()) {
-    rest.normal = adopt_normals(cloud.normal, rest.normal);
-  } else {
+  if (!cloud.has_normals()) {
     rest.component_count = orient_normals(cloud.position, rest.graph, rest.normal, &context).components;
   }
   if (context.is_cancelled()) return cancelled_error();

@@ -24,6 +24,13 @@ struct RestSurface {
 /// k of §2.1: 4 to 32 (the paper: 8 to 12). Error: kInvalidArgument, field "neighbors".
 Result<void> validate_neighbors(std::uint32_t neighbors);
 
+/// Unit normals: the uploaded ones, made unit, where the cloud has them and they are directions; else
+/// estimated, on whatever side.
+/// Shapes:  N samples and their graph
+/// Cost:    that of estimate_normals
+/// Cancels: between blocks of samples; the normals are then incomplete and must be dropped
+Points usable_normals(const Cloud& cloud, const NeighborGraph& graph, const ExecutionContext& context);
+
 /// Shapes:      N >= 1 samples in coherent order; k neighbours each
 /// Errors:      kInvalidArgument (neighbors), kEmptyCloud, kCancelled
 /// Cost:        O(N k log N)

@@ -19,19 +19,6 @@ namespace {
 /// size: sessions take them as fractions of a diagonal, which differs a little from sampling to sampling.
 constexpr double kScaleTolerance = 1e-3;
 
-std::string place_of(std::size_t edit) {
-  return "/recipe/edits/" + std::to_string(edit);
-}
-
-/// The problem of one edit of the recipe, its pointers those of the document.
-Problem problem_of_edit(const Error& error, std::size_t edit) {
-  Problem problem = protocol::to_problem(error);
-  problem.detail = "edit " + std::to_string(edit + 1) + ": " + problem.detail;
-  for (protocol::JsonFault& fault : problem.errors) fault.pointer.insert(0, place_of(edit));
-  if (problem.errors.empty()) problem.errors.push_back({.pointer = place_of(edit), .detail = error.message});
-  return problem;
-}
-
 std::string list_of(const std::vector<double>& scales) {
   std::string text;
   for (const double scale : scales)
@@ -83,7 +70,7 @@ class Application {
     } else if (goes_on) {
       whole_is_recorded_ = false;
       auto next = played(session_, whole_, edit.edit, marks_);
-      if (!next) return problem_of_edit(next.error(), index);
+      if (!next) return problem_of_recipe_edit(next.error(), index);
       whole_ = std::move(next).value();
     }
     marks_ = carried_marks(*painted, marks_, *whole_.samples);
@@ -103,7 +90,7 @@ class Application {
   std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
     auto marks = std::make_shared<Marks>(whole_.surface->finest().position.size(), std::uint8_t{0});
     Painter painter(session_.params(), paint_surface(whole_), {}, {});
-    const std::string place = place_of(index);
+    const std::string place = place_in_recipe(index);
     if (auto problem = paint(painter, RegionKind::kZero, edit.zero, *marks, place + "/zero/operations"))
       return problem;
     if (auto problem = paint(painter, RegionKind::kOne, edit.one, *marks, place + "/one/operations"))
@@ -133,7 +120,7 @@ class Application {
         carried_marks(*whole_.samples, marks_, *samples, nullptr, whole_is_recorded_ ? kAllIds : shared_ids_);
     const auto now = std::chrono::system_clock::now();
     if (auto made = server::record(session_, history, params, marks, now); !made)
-      return problem_of_edit(made.error(), index);
+      return problem_of_recipe_edit(made.error(), index);
     recorded_marks_ = carried_marks(*samples, marks, *history.current().samples);
     return std::nullopt;
   }
@@ -150,6 +137,19 @@ class Application {
 };
 
 }  // namespace
+
+std::string place_in_recipe(std::size_t edit) {
+  return "/recipe/edits/" + std::to_string(edit);
+}
+
+Problem problem_of_recipe_edit(const Error& error, std::size_t edit) {
+  const std::string place = place_in_recipe(edit);
+  Problem problem = protocol::to_problem(error);
+  problem.detail = "edit " + std::to_string(edit + 1) + ": " + problem.detail;
+  for (protocol::JsonFault& fault : problem.errors) fault.pointer.insert(0, place);
+  if (problem.errors.empty()) problem.errors.push_back({.pointer = place, .detail = error.message});
+  return problem;
+}
 
 Outcome<SharedDocument> apply_recipe(Session& session, const protocol::RecipeRequest& request,
                                      Session::Expected expected, const Seal<SharedDocument>& seal) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "server/sessions/recipes.h"
 
@@ -16,6 +17,11 @@ struct SequencePlace {
   double part = 0.0;      ///< of the edit after them, in [0, 1)
 };
 SequencePlace place_in_sequence(double s, std::size_t edits);
+
+/// Where an edit stands in a request's document.
+std::string place_in_recipe(std::size_t edit);
+/// The problem of one edit of a recipe, its pointers those of the document.
+protocol::Problem problem_of_recipe_edit(const Error& error, std::size_t edit);
 
 /// The state after an edit with a painting; what it may be refused for when it is made, it is refused for
 /// here too.

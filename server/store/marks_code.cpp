@@ -1,12 +1,9 @@
 #include "server/store/marks_code.h"
 
-#include <cstdint>
 #include <cstring>
 
 namespace pointwright::server {
 namespace {
-
-constexpr std::uint64_t kMostSamples = 4'000'000'000;
 
 /// The end of the run that starts at `begin`. Eight marks at a time: most runs are long.
 std::size_t end_of_run(const Marks& marks, std::size_t begin) {
@@ -37,7 +34,7 @@ std::vector<std::byte> encode_marks(const Marks& marks) {
   return bytes;
 }
 
-std::optional<Marks> decode_marks(std::span<const std::byte> bytes) {
+std::optional<Marks> decode_marks(std::span<const std::byte> bytes, std::uint64_t most) {
   Marks marks;
   while (!bytes.empty()) {
     std::uint64_t value = 0;
@@ -52,7 +49,7 @@ std::optional<Marks> decode_marks(std::span<const std::byte> bytes) {
       goes_on = byte >= 128;
     }
     const std::uint64_t length = value >> 2U;
-    if (length == 0 || length > kMostSamples - marks.size()) return std::nullopt;
+    if (length == 0 || length > most - marks.size()) return std::nullopt;
     marks.insert(marks.end(), static_cast<std::size_t>(length), static_cast<std::uint8_t>(value & 3U));
   }
   return marks;

@@ -6,7 +6,9 @@
 
 #include "protocol/frames/frame.h"
 #include "protocol/frames/stream_record.h"
+#include "protocol/json/access.h"
 #include "protocol/json/parse.h"
+#include "protocol/json/recipe.h"
 #include "protocol/json/requests.h"
 #include "tests/fuzz/targets.h"
 
@@ -84,6 +86,12 @@ void try_json(std::span<const std::byte> bytes) {
   take(document.value(), parse_preview);
   take(document.value(), parse_create_session);
   take(document.value(), parse_head);
+  take(document.value(), parse_import_cloud);
+  take(document.value(), parse_session_change);
+  take(document.value(), parse_recipe_request);
+  take(document.value(), parse_token_request);
+  take(document.value(), parse_share_request);
+  take(document.value(), parse_token_file);
 }
 
 }  // namespace pointwright::fuzz

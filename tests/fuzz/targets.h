@@ -18,5 +18,8 @@ void try_png(std::span<const std::byte> bytes);         ///< the gate, then the 
 void try_frame(std::span<const std::byte> bytes);       ///< the decoder of sample frames
 void try_stream(std::span<const std::byte> bytes);      ///< records of a stream, cut anywhere
 void try_json(std::span<const std::byte> bytes);        ///< the text, then every request's parser
+void try_head(std::span<const std::byte> bytes);        ///< a request's head, then what reads its fields
+void try_answer(std::span<const std::byte> bytes);      ///< what a decoder that went mad may say
+void try_marks(std::span<const std::byte> bytes);       ///< marks as they are stored
 
 }  // namespace pointwright::fuzz

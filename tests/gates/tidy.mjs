@@ -75,6 +75,8 @@ async function sourcesWithFlags() {
   return found;
 }
 
+const notNames = new Set(["static_assert", "void", "const"]);
+const attributes = /__attribute__\(\(.*?\)\)(?!\))|\b(?:alignas|decltype)\(\w*\)/g;
 const definitions = new Map();
 /**
  * Names that a file defines at namespace scope, where clang-format puts definitions into the first column: all of them, and
@@ -94,10 +96,11 @@ function namesDefined(path) {
       /^(namespace|using namespace|return|public|private|TEST_CASE)\b/.test(line)
     )
       continue;
-    for (const [, name] of line.matchAll(/(?<!::)\b([A-Za-z_]\w*)\s*(?=[({=;[]|$)/g)) {
-      all.add(name);
-      if (named.length === 0 || named.includes(false)) own.add(name);
-    }
+    // What is defined is the first name that something opens or ends behind; the rest of the line uses names.
+    const name = line.replace(attributes, "").match(/(?<!::)\b([A-Za-z_]\w*)\s*(?=[({=;[]|$)/)?.[1];
+    if (!name || notNames.has(name)) continue;
+    all.add(name);
+    if (named.length === 0 || named.includes(false)) own.add(name);
   }
   definitions.set(path, { all, own });
   return definitions.get(path);

@@ -222,6 +222,8 @@ TEST_CASE("marks come back from their runs, and nothing else comes from bytes th
   CHECK_FALSE(decode_marks(bytes).has_value());                                 // ends within a run
   CHECK_FALSE(decode_marks(std::vector<std::byte>{std::byte{1}}).has_value());  // a run of nothing
   CHECK_FALSE(decode_marks(std::vector<std::byte>(9, std::byte{255})).has_value());
+  CHECK(decode_marks(encode_marks(Marks(1000, 1)), 1000).has_value());
+  CHECK_FALSE(decode_marks(encode_marks(Marks(1000, 1)), 999).has_value());
 }
 
 TEST_CASE("a key has one answer, belongs to one request, and is busy while that is under way") {

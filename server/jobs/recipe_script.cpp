@@ -1,0 +1,187 @@
+#include "server/jobs/recipe_script.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "engine/core/median.h"
+#include "engine/resampling/resampled_edit.h"
+#include "server/sessions/painter.h"
+#include "server/sessions/recipe_play.h"
+#include "server/sessions/surface_state.h"
+
+namespace pointwright::server {
+namespace {
+
+using protocol::Problem;
+using protocol::RecipeEdit;
+
+LevelBases bases_of(Hierarchy& hierarchy) {
+  return {.bands = std::move(hierarchy.bases), .spacing = median(hierarchy.spacing)};
+}
+
+/// The state of a recipe that is being played, and the script that grows with it.
+class Player {
+ public:
+  Player(std::shared_ptr<const Cloud> preview, const HierarchyParams& params, const ExecutionContext& context)
+      : context_(context) {
+    limits_.max_operations = protocol::kMaxPaintOperations;
+    rest_ = RestModel{
+        .params = params,
+        .origin = preview->origin,
+        .diagonal = bounds_of(preview->position).diagonal(),
+        .build =
+            [this](const Cloud& cloud, const HierarchyParams& levels, const ExecutionContext& running) {
+              auto built = build_hierarchy(cloud, levels, running);
+              if (built) derived_ = bases_of(built.value());
+              return built;
+            },
+        .resample = apply_resampled_edit,
+        .room = std::make_shared<SampleRoom>(kNoParent)};
+    cloud_ = std::move(preview);
+  }
+
+  std::optional<Problem> start() {
+    auto built = build_hierarchy(*cloud_, rest_.params, context_);
+    if (!built) return protocol::to_problem(built.error());
+    Hierarchy hierarchy = std::move(built).value();
+    script_ = {.origin = cloud_->origin,
+               .rest = hierarchy.surface.finest(),
+               .bases = bases_of(hierarchy),
+               .edits = {},
+               .neighbors = rest_.params.neighbors,
+               .spacing_ratio = 1.0F};
+    const SharedSamples samples = samples_at_rest(
+        rest_sampling(cloud_, std::make_shared<const NeighborGraph>(std::move(hierarchy.graph)),
+                      std::move(hierarchy.spacing)),
+        hierarchy.surface.finest());
+    shared_ids_ = rest_.uploaded_ids = samples->sampling->next_id;
+    made_ = {
+        .surface = std::make_shared<const MultiresSurface>(std::move(hierarchy.surface)),
+        .reports = std::make_shared<const std::vector<DecompositionReport>>(std::move(hierarchy.reports)),
+        .first_valid_level = 0,
+        .samples = samples};
+    whole_ = made_;
+    return std::nullopt;
+  }
+
+  /// `part` of an edit. `goes_on`: another one follows, which is painted on the surface of whole edits.
+  std::optional<Problem> add(std::size_t index, const RecipeEdit& edit, double part, bool goes_on) {
+    if (edit.paints) {
+      if (auto problem = paint(index, edit)) return problem;
+    }
+    if (marks_ == nullptr) marks_ = std::make_shared<Marks>(whole_.surface->sample_count(), std::uint8_t{0});
+    const SharedMarks marks = carried_marks(*whole_.samples, marks_, *made_.samples, nullptr,
+                                            made_is_whole_ ? kAllIds : shared_ids_);
+    const SharedSamples painted = whole_.samples;
+    if (made_is_whole_) shared_ids_ = whole_.samples->sampling->next_id;
+    auto next = make(made_, recordable_part(edit.edit, part), marks, &script_);
+    if (!next) return problem_of_recipe_edit(next.error(), index);
+    made_ = std::move(next).value();
+    if (part == 1.0 && made_is_whole_) {
+      whole_ = made_;
+    } else if (goes_on) {
+      made_is_whole_ = false;
+      auto whole = make(whole_, edit.edit, marks_, nullptr);
+      if (!whole) return problem_of_recipe_edit(whole.error(), index);
+      whole_ = std::move(whole).value();
+    }
+    marks_ = carried_marks(*painted, marks_, *whole_.samples);
+    return std::nullopt;
+  }
+
+  PlayedRecipe finish() {
+    return {.script = std::move(script_),
+            .rest = cloud_->position,
+            .result = made_.surface->finest().position,
+            .inserted = made_.samples->size() - std::min(made_.samples->size(), cloud_->size())};
+  }
+
+ private:
+  std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
+    auto marks = std::make_shared<Marks>(whole_.surface->sample_count(), std::uint8_t{0});
+    Painter painter(limits_, paint_surface(whole_), {}, {});
+    for (const auto& [kind, operations, name] : {std::tuple(RegionKind::kZero, &edit.zero, "/zero"),
+                                                 std::tuple(RegionKind::kOne, &edit.one, "/one")}) {
+      for (std::size_t i = 0; i < operations->size(); ++i) {
+        const auto painted = painter.paint(kind, (*operations)[i], *marks, context_);
+        if (painted.ok()) continue;
+        Problem problem = painted.problem();
+        problem.errors.push_back(
+            {.pointer = place_in_recipe(index) + name + "/operations/" + std::to_string(i),
+             .detail = problem.detail});
+        return problem;
+      }
+    }
+    marks_ = std::move(marks);
+    return std::nullopt;
+  }
+
+  /// One edit; what it needs elsewhere goes into the script, where one is given.
+  Result<SurfaceState> make(const SurfaceState& before, const EditParams& params, const SharedMarks& marks,
+                            EditScript* script) {
+    if (auto valid = validate(params, *before.surface); !valid) return valid.error();
+    derived_ = {};
+    auto state = with_valid_level(rest_, before, params.level, context_);
+    if (!state) return state.error();
+    auto field = field_of(state.value(), params.level, params.blend, *marks);
+    if (!field) return field.error();
+    auto after = edited(rest_, state.value(), params, field.value(), ResamplingEffort::kExact, context_);
+    if (!after) return after.error();
+    if (auto reach = check_reach(*after.value().surface, params.level); !reach) return reach.error();
+    if (script != nullptr)
+      script->edits.push_back(
+          {.params = params, .regions = *field.value().regions, .derived = std::move(derived_)});
+    return after;
+  }
+
+  std::shared_ptr<const Cloud> cloud_;
+  const ExecutionContext& context_;
+  SessionParams limits_;
+  RestModel rest_;
+  LevelBases derived_;  // what the last derivation of levels was made of
+  EditScript script_;
+  SurfaceState whole_;  // with all edits so far whole: what paintings are made on
+  SurfaceState made_;   // with the parts that were asked for
+  bool made_is_whole_ = true;
+  std::uint32_t shared_ids_ = kAllIds;  // of samples that both may have
+  SharedMarks marks_;                   // on the samples of whole_
+};
+
+}  // namespace
+
+Outcome<HierarchyParams> hierarchy_for(const protocol::Recipe& recipe, const Cloud& preview,
+                                       std::uint32_t neighbors) {
+  HierarchyParams params{.scales = {}, .neighbors = neighbors};
+  const auto diagonal = static_cast<double>(bounds_of(preview.position).diagonal());
+  for (std::size_t k = 0; k + 1 < recipe.level_scales.size(); ++k)
+    params.scales.push_back(static_cast<float>(diagonal > 0.0 ? recipe.level_scales[k] / diagonal : 0.0));
+  if (auto valid = validate(params); !valid) {
+    Problem problem = protocol::to_problem(valid.error());
+    problem.detail = "the recipe's levels do not fit this cloud: " + problem.detail;
+    problem.errors = {{.pointer = "/recipe/level_scales", .detail = valid.error().message}};
+    return problem;
+  }
+  return params;
+}
+
+Outcome<PlayedRecipe> play_on_preview(const protocol::RecipeRequest& request,
+                                      std::shared_ptr<const Cloud> preview, const HierarchyParams& params,
+                                      const ExecutionContext& context) {
+  Player player(std::move(preview), params, context);
+  if (auto problem = player.start()) return *problem;
+  const std::vector<RecipeEdit>& edits = request.recipe.edits;
+  const bool in_sequence = request.timing == protocol::Timing::kSequence;
+  const SequencePlace place = place_in_sequence(request.s, edits.size());
+  const std::size_t count = in_sequence ? place.whole + (place.part > 0.0 ? 1 : 0) : edits.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double part = !in_sequence ? request.s : i < place.whole ? 1.0 : place.part;
+    if (auto problem = player.add(i, edits[i], part, i + 1 < count)) return *problem;
+  }
+  return player.finish();
+}
+
+}  // namespace pointwright::server

@@ -1,0 +1,37 @@
+#pragma once
+// A recipe played on a preview, without a session: what it says about all other samplings of the surface.
+
+#include <memory>
+
+#include "engine/core/cloud.h"
+#include "engine/core/execution_context.h"
+#include "engine/multires/hierarchy.h"
+#include "engine/transfer/transferred_edits.h"
+#include "protocol/json/recipe.h"
+#include "server/base/outcome.h"
+
+namespace pointwright::server {
+
+struct PlayedRecipe {
+  EditScript script;
+  /// The preview's own samples, before and after.
+  Points rest;
+  Points result;
+  std::size_t inserted = 0;  ///< samples that resampling has inserted, less those it has collected
+};
+
+/// The builder's parameters for a recipe's levels on this cloud. Problem: kInvalidValue where no builder takes
+/// them.
+Outcome<HierarchyParams> hierarchy_for(const protocol::Recipe& recipe, const Cloud& preview,
+                                       std::uint32_t neighbors);
+
+/// Makes the recipe's edits on the preview, up to request.s, as a session that applies the recipe does: the
+/// same regions, levels and bits.
+/// Problems:    those of applying a recipe, with pointers into the request's document; kCancelled
+/// Cost:        building the preview's levels, then a replay
+/// Determinism: bitwise equal for any thread count
+Outcome<PlayedRecipe> play_on_preview(const protocol::RecipeRequest& request,
+                                      std::shared_ptr<const Cloud> preview, const HierarchyParams& params,
+                                      const ExecutionContext& context);
+
+}  // namespace pointwright::server
