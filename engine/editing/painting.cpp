@@ -37,12 +37,17 @@ class ShapeCover {
       : surface_(surface), facing_(operation.facing), shape_(operation.shape) {
     if (const auto* model = std::get_if<ModelShape>(&operation.shape))
       model_.emplace(*model, surface.position, surface.origin, context);
+    if (const auto* region = std::get_if<RegionShape>(&operation.shape)) members_ = region->members.get();
   }
 
   // Writes covered[0, end - begin). Stops early where cancelled.
   void cover(std::size_t begin, std::size_t end, std::uint8_t* covered,
              const ExecutionContext* context) const {
     if (model_) return cover_by_model(begin, end, covered, context);
+    if (members_ != nullptr) {
+      for (std::size_t i = begin; i < end; ++i) covered[i - begin] = (*members_)[i] != 0 && faces(i) ? 1 : 0;
+      return;
+    }
     std::vector<std::uint32_t> of_range;
     std::vector<std::uint32_t> of_block;
     const bool range_reached = shape_.may_cover(model_box(surface_, begin, end), of_range);
@@ -83,6 +88,7 @@ class ShapeCover {
   const std::optional<Vec3d>& facing_;
   CulledShape shape_;
   std::optional<ModelCover> model_;
+  const SampleMask* members_ = nullptr;
 };
 
 // What becomes of a sample, whether the operation covers it or not.

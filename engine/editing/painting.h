@@ -84,7 +84,8 @@ SampleMask covered_samples(const PaintOperation& operation, RegionKind kind, con
                            const Marks& marks, const ExecutionContext* context = nullptr);
 
 /// Applies one operation to the marks of `kind`. Returns how many samples changed their mark.
-/// Pre:         validate(operation); its image or model was found; texture coordinates where it needs them
+/// Pre:         validate(operation); its image, model or region was found, the region's samples being the
+///              surface's; texture coordinates where it needs them
 /// Cost:        O(N), parallel over samples. A stroke or point set of V vertices adds O(V log V) to sort its
 ///              segments once, O(log V) for each range of kParallelBlock samples, and a test of each of a
 ///              block's 128 samples against the segments within the radius of that block. Long segments whose

@@ -132,6 +132,10 @@ Result<void> validate_one(const ModelShape& shape) {
   return validate_model_shape(shape);
 }
 
+Result<void> validate_one(const RegionShape&) {
+  return {};
+}
+
 bool contains_one(const Sphere& sphere, const Vec3d& point) {
   return (point - sphere.center).squaredNorm() <= sphere.radius * sphere.radius;
 }
@@ -175,6 +179,10 @@ bool contains_one(const ModelShape& shape, const Vec3d& point) {
   return model_contains(shape, point);
 }
 
+bool contains_one(const RegionShape&, const Vec3d&) {
+  return false;
+}
+
 }  // namespace
 
 Result<void> validate(const Shape& shape) {
@@ -196,6 +204,7 @@ bool contains(const Shape& shape, const Vec3d& point, const TexCoord* texcoord) 
 bool has_its_data(const Shape& shape) {
   if (const auto* image = std::get_if<ImageShape>(&shape)) return image->image != nullptr;
   if (const auto* model = std::get_if<ModelShape>(&shape)) return model->cloud != nullptr;
+  if (const auto* region = std::get_if<RegionShape>(&shape)) return region->members != nullptr;
   return true;
 }
 
@@ -206,7 +215,8 @@ bool needs_texcoord(const Shape& shape) {
 
 bool depends_on_sampling(const Shape& shape) {
   if (const auto* screen = std::get_if<ScreenShape>(&shape)) return screen->visible;
-  return std::holds_alternative<ImageShape>(shape) || std::holds_alternative<ModelShape>(shape);
+  return std::holds_alternative<ImageShape>(shape) || std::holds_alternative<ModelShape>(shape) ||
+         std::holds_alternative<RegionShape>(shape);
 }
 
 std::size_t vertex_count(const Shape& shape) {

@@ -3,6 +3,9 @@
 // and other primitives").
 
 #include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -47,8 +50,16 @@ struct HalfSpace {
 /// All of space.
 struct Everything {};
 
+/// The samples of a region of the surface that is painted, as they are when it is painted.
+struct RegionShape {
+  std::string source;  ///< the caller's name of the region; nothing here reads it
+  /// One entry for each sample of the surface, 0 or 1; null until it was found: nothing is painted with it
+  /// then.
+  std::shared_ptr<const std::vector<std::uint8_t>> members;
+};
+
 using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything, PointSet, ScreenShape, ImageShape,
-                           ModelShape>;
+                           ModelShape, RegionShape>;
 
 /// Finite members within kMaxShapeCoordinate, radii > 0, min <= max, a normal that is not zero, at least one
 /// and at most kMaxStrokeVertices vertices or points.
@@ -56,12 +67,12 @@ using Shape = std::variant<Sphere, Stroke, AxisBox, HalfSpace, Everything, Point
 Result<void> validate(const Shape& shape);
 
 /// Whether the shape holds a sample at a place of model space. Images that are mapped by texture coordinates
-/// hold none without one.
+/// hold none without one, regions none: they are of samples, not of places.
 /// Pre:  an image or a model was found
 /// Cost: O(1), O(vertices) for strokes, point sets and outlines, O(samples) for models
 bool contains(const Shape& shape, const Vec3d& point, const TexCoord* texcoord = nullptr);
 
-/// Whether the image or the model that the shape names is there; true for all other shapes.
+/// Whether the image, the model or the region that the shape names is there; true for all other shapes.
 bool has_its_data(const Shape& shape);
 /// Whether the shape reads the texture coordinates of samples.
 bool needs_texcoord(const Shape& shape);

@@ -128,4 +128,26 @@ StretchColumns stretch_columns(const Sampling& sampling) {
   return columns;
 }
 
+Points stretch_directions(const Sampling& sampling) {
+  constexpr float kRound = 1.001F;  // a rounder cell has no direction
+  Points directions(sampling.size());
+  for (float* column : {directions.x(), directions.y(), directions.z()})
+    std::fill_n(column, directions.size(), 0.0F);
+  if (sampling.cell_u.empty()) return directions;
+  parallel_for(sampling.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3f u = sampling.cell_u[i];
+      const Vec3f v = sampling.cell_v[i];
+      const PrincipalStretch stretch = principal_stretch(u, v);
+      if (!(stretch.major > kRound * stretch.minor)) continue;
+      Vec3f axis = (stretch.cosine * u + stretch.sine * v).stableNormalized();
+      Eigen::Index longest = 0;
+      axis.cwiseAbs().maxCoeff(&longest);
+      if (axis[longest] < 0.0F) axis = -axis;
+      directions.set(i, axis);
+    }
+  });
+  return directions;
+}
+
 }  // namespace pointwright

@@ -58,5 +58,9 @@ struct StretchColumns {
 };
 /// Cost: O(N), parallel.
 StretchColumns stretch_columns(const Sampling& sampling);
+/// The direction of the larger principal stretch, by sample: unit vectors whose longest component is
+/// positive; zero where neither axis is longer by a thousandth, and where the sampling carries no cells.
+/// Cost: O(N), parallel.
+Points stretch_directions(const Sampling& sampling);
 
 }  // namespace pointwright

@@ -30,6 +30,16 @@ JsonDocument region_summary(const RegionSummary& region) {
   return JsonDocument{{"samples", region.samples}, {"operations", region.operations}};
 }
 
+JsonDocument region_entry(std::string_view name, const RegionSummary& region) {
+  return JsonDocument{{"region", name}, {"samples", region.samples}, {"operations", region.operations}};
+}
+
+JsonDocument named_regions(const SessionDocument& session) {
+  JsonDocument array = JsonDocument::array();
+  for (const NamedRegionSummary& each : session.named) array.push_back(region_entry(each.name, each.region));
+  return array;
+}
+
 JsonDocument progress_members(const Progress& progress) {
   return JsonDocument{{"phase", progress.phase}, {"fraction", checked_number(progress.fraction)}};
 }
@@ -138,6 +148,19 @@ JsonDocument to_json(const UploadDocument& upload) {
                       {"expires", to_rfc3339(upload.expires)}};
 }
 
+JsonDocument to_json(const ImportDocument& import) {
+  constexpr std::array<std::string_view, 4> kStates{"accepted", "running", "successful", "failed"};
+  JsonDocument document{{"id", import.id},
+                        {"name", import.name},
+                        {"bytes", import.bytes},
+                        {"created", to_rfc3339(import.created)},
+                        {"state", kStates.at(static_cast<std::size_t>(import.state))},
+                        {"progress", progress_members(import.progress)}};
+  if (import.problem) document["problem"] = to_json(*import.problem);
+  if (import.cloud) document["cloud"] = to_json(*import.cloud);
+  return document;
+}
+
 JsonDocument to_json(const DecompositionReport& report) {
   return JsonDocument{{"scale", checked_number(report.scale)},
                       {"base_samples", report.base_samples},
@@ -150,13 +173,15 @@ JsonDocument to_json(const DecompositionReport& report) {
 }
 
 JsonDocument to_json(const SessionSummary& session) {
-  return JsonDocument{{"id", session.id},
-                      {"name", session.name},
-                      {"cloud", session.cloud},
-                      {"state", session_state_name(session.state)},
-                      {"revision", session.revision},
-                      {"created", to_rfc3339(session.created)},
-                      {"sample_count", session.sample_count}};
+  JsonDocument document{{"id", session.id},
+                        {"name", session.name},
+                        {"cloud", session.cloud},
+                        {"state", session_state_name(session.state)},
+                        {"revision", session.revision},
+                        {"created", to_rfc3339(session.created)},
+                        {"sample_count", session.sample_count}};
+  if (session.preview) document["preview"] = {{"count", session.preview->count}, {"of", session.preview->of}};
+  return document;
 }
 
 JsonDocument to_json(const SessionDocument& session) {
@@ -169,8 +194,9 @@ JsonDocument to_json(const SessionDocument& session) {
   document["spacing"] = checked_number(session.spacing);
   document["levels"] = level_list(session.level_scales);
   document["decomposition"] = document_array(session.decomposition);
-  document["regions"] =
-      JsonDocument{{"zero", region_summary(session.zero)}, {"one", region_summary(session.one)}};
+  document["regions"] = JsonDocument{{"zero", region_summary(session.zero)},
+                                     {"one", region_summary(session.one)},
+                                     {"named", named_regions(session)}};
   document["history"] = JsonDocument{{"head", session.head}, {"edits", session.edits}};
   JsonDocument timings = JsonDocument::object();
   for (const auto& [name, milliseconds] : session.timings_ms) timings[name] = checked_number(milliseconds);
@@ -205,6 +231,10 @@ JsonDocument cloud_list(const std::vector<CloudDocument>& clouds) {
   return JsonDocument{{"clouds", document_array(clouds)}};
 }
 
+JsonDocument import_list(const std::vector<ImportDocument>& imports) {
+  return JsonDocument{{"imports", document_array(imports)}};
+}
+
 JsonDocument upload_list(const std::vector<UploadDocument>& uploads) {
   return JsonDocument{{"uploads", document_array(uploads)}};
 }
@@ -217,11 +247,18 @@ JsonDocument session_list(const std::vector<SessionSummary>& sessions) {
   return JsonDocument{{"sessions", document_array(sessions)}};
 }
 
-JsonDocument painting_document(RegionKind region, std::uint64_t samples,
+JsonDocument region_list(const SessionDocument& session) {
+  JsonDocument regions = named_regions(session);
+  regions.insert(regions.begin(), region_entry("one", session.one));
+  regions.insert(regions.begin(), region_entry("zero", session.zero));
+  return JsonDocument{{"regions", std::move(regions)}};
+}
+
+JsonDocument painting_document(std::string_view region, std::uint64_t samples,
                                const std::vector<std::shared_ptr<const PaintOperation>>& operations) {
   JsonDocument list = JsonDocument::array();
   for (const auto& operation : operations) list.push_back(to_json(*operation));
-  return JsonDocument{{"region", region_name(region)}, {"samples", samples}, {"operations", std::move(list)}};
+  return JsonDocument{{"region", region}, {"samples", samples}, {"operations", std::move(list)}};
 }
 
 JsonDocument edit_list(std::uint32_t head, const std::vector<EditRecord>& edits) {

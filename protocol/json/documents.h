@@ -47,6 +47,21 @@ struct UploadDocument {
   TimePoint expires;
 };
 
+/// As OGC API - Processes calls them.
+enum class ImportState { kAccepted, kRunning, kSuccessful, kFailed };
+
+/// A cloud on its way in, while its client goes on.
+struct ImportDocument {
+  std::string id;
+  std::string name;         ///< of the cloud
+  std::uint64_t bytes = 0;  ///< of the file
+  TimePoint created;
+  ImportState state = ImportState::kAccepted;
+  Progress progress;
+  std::optional<Problem> problem = std::nullopt;      ///< kFailed: why
+  std::optional<CloudDocument> cloud = std::nullopt;  ///< kSuccessful
+};
+
 enum class SessionState { kBuilding, kReady, kFailed, kAsleep };
 
 struct ImageDocument {
@@ -62,6 +77,17 @@ struct RegionSummary {
   std::uint64_t samples = 0;
   std::uint64_t operations = 0;
 };
+/// A region besides zero and one.
+struct NamedRegionSummary {
+  std::string name;
+  RegionSummary region;
+};
+
+/// A session on some of its cloud's samples.
+struct PreviewSize {
+  std::uint64_t count = 0;
+  std::uint64_t of = 0;  ///< samples of the cloud
+};
 
 /// A session in a list.
 struct SessionSummary {
@@ -71,7 +97,8 @@ struct SessionSummary {
   SessionState state = SessionState::kBuilding;
   std::uint64_t revision = 0;
   TimePoint created;
-  std::uint64_t sample_count = 0;  ///< of the surface as edited; while building, of the cloud
+  std::uint64_t sample_count = 0;  ///< of the surface as edited; while building, what it begins with
+  std::optional<PreviewSize> preview = std::nullopt;  ///< none: it has all samples of its cloud
 };
 
 struct SessionDocument {
@@ -85,8 +112,9 @@ struct SessionDocument {
   std::vector<DecompositionReport> decomposition;
   RegionSummary zero;
   RegionSummary one;
-  std::uint32_t head = 0;   ///< edits that are applied
-  std::uint32_t edits = 0;  ///< edits in the history, those undone included
+  std::vector<NamedRegionSummary> named;  ///< by name
+  std::uint32_t head = 0;                 ///< edits that are applied
+  std::uint32_t edits = 0;                ///< edits in the history, those undone included
   std::vector<std::pair<std::string, double>> timings_ms;
 };
 
@@ -124,17 +152,21 @@ JsonDocument to_json(const ImportReport& report);
 JsonDocument to_json(const CloudDocument& cloud);
 JsonDocument to_json(const ImageDocument& image);
 JsonDocument to_json(const UploadDocument& upload);
+JsonDocument to_json(const ImportDocument& import);
 JsonDocument to_json(const DecompositionReport& report);
 JsonDocument to_json(const SessionSummary& session);
 JsonDocument to_json(const SessionDocument& session);
 JsonDocument to_json(const EditRecord& record);
 JsonDocument to_json(const InfoDocument& info);
 JsonDocument cloud_list(const std::vector<CloudDocument>& clouds);
+JsonDocument import_list(const std::vector<ImportDocument>& imports);
 JsonDocument upload_list(const std::vector<UploadDocument>& uploads);
 JsonDocument image_list(const std::vector<ImageDocument>& images);
 JsonDocument session_list(const std::vector<SessionSummary>& sessions);
+/// {"regions"}: zero, one, and the named ones.
+JsonDocument region_list(const SessionDocument& session);
 /// {"region", "samples", "operations"}
-JsonDocument painting_document(RegionKind region, std::uint64_t samples,
+JsonDocument painting_document(std::string_view region, std::uint64_t samples,
                                const std::vector<std::shared_ptr<const PaintOperation>>& operations);
 /// {"head", "edits"}
 JsonDocument edit_list(std::uint32_t head, const std::vector<EditRecord>& edits);

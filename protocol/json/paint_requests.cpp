@@ -9,8 +9,8 @@ namespace pointwright::protocol {
 namespace {
 
 // In the order of Shape's alternatives.
-constexpr std::array<std::string_view, 9> kShapeNames{"sphere", "stroke", "box",   "half_space", "all",
-                                                      "points", "screen", "image", "model"};
+constexpr std::array<std::string_view, 10> kShapeNames{"sphere", "stroke", "box",   "half_space", "all",
+                                                       "points", "screen", "image", "model",      "region"};
 static_assert(std::variant_size_v<Shape> == kShapeNames.size());
 // In the order of ScreenShape::outline's alternatives.
 constexpr std::array<std::string_view, 3> kOutlineNames{"polygon", "ellipse", "polyline"};
@@ -176,6 +176,17 @@ ModelShape read_model(ObjectReader& object) {
   return shape;
 }
 
+RegionShape read_region(ObjectReader& object) {
+  RegionShape shape;
+  if (const Json* const name = object.required("region")) {
+    const std::string pointer = object.pointer_to("region");
+    shape.source = read_string(*name, pointer, object.errors()).value_or("");
+    if (name->is_string() && !region_of_name(shape.source) && !is_valid_region_name(shape.source))
+      object.errors().add(pointer, "must be zero, one or the name of a region");
+  }
+  return shape;
+}
+
 Shape read_shape(const Json& value, const std::string& pointer, JsonErrors& errors) {
   ObjectReader object(value, pointer, errors);
   const auto type = required_choice(object, "type", kShapeNames);
@@ -198,6 +209,8 @@ Shape read_shape(const Json& value, const std::string& pointer, JsonErrors& erro
     shape = read_image(object);
   } else if (kShapeNames[*type] == "model") {
     shape = read_model(object);
+  } else if (kShapeNames[*type] == "region") {
+    shape = read_region(object);
   }
   object.finish();
   return shape;
@@ -328,6 +341,9 @@ void put_members(const ModelShape& model, JsonDocument& document) {
   document["cloud"] = model.source;
   document["matrix"] = model.matrix;
   document["thickness"] = model.thickness;
+}
+void put_members(const RegionShape& region, JsonDocument& document) {
+  document["region"] = region.source;
 }
 
 }  // namespace

@@ -234,6 +234,13 @@ Parsed<CreateSessionRequest> parse_create_session(const Json& document) {
     request.params.neighbors = static_cast<std::uint32_t>(
         read_integer(*neighbors, "/neighbors", errors, 0, kMaxNeighbors).value_or(0));
   }
+  if (const Json* const preview = object.optional("preview")) {
+    constexpr std::uint64_t kMaxCount = 0xFFFFFFFFU;
+    ObjectReader members(*preview, "/preview", errors);
+    if (const Json* const count = members.required("count"))
+      request.preview = read_integer(*count, "/preview/count", errors, 1, kMaxCount);
+    members.finish();
+  }
   object.finish();
   if (errors.empty()) add_verdict(validate(request.params), "", errors);
   return value_or_errors(std::move(request), std::move(errors));
@@ -347,6 +354,17 @@ std::optional<RegionKind> region_of_name(std::string_view name) {
   if (name == "zero") return RegionKind::kZero;
   if (name == "one") return RegionKind::kOne;
   return std::nullopt;
+}
+
+bool is_valid_region_name(std::string_view name) {
+  constexpr std::size_t kMaxBytes = 64;
+  constexpr std::array<std::string_view, 5> kReserved{"zero", "one", "t", ".", ".."};
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == ' ' || c == '.' || c == '-';
+  };
+  return !name.empty() && name.size() <= kMaxBytes && std::ranges::all_of(name, allowed) &&
+         std::ranges::find(kReserved, name) == kReserved.end();
 }
 
 std::string pointer_of_field(std::string_view field) {

@@ -25,6 +25,7 @@ struct CreateSessionRequest {
   std::string cloud;  ///< an id
   std::string name;   ///< empty where none was given
   HierarchyParams params;
+  std::optional<std::uint64_t> preview = std::nullopt;  ///< of so many of the cloud's samples; none: all
 };
 
 /// POST /v1/clouds with a document
@@ -84,6 +85,9 @@ JsonDocument to_json(const EditParams& edit);
 std::string_view blend_name(Blend blend);         ///< "quartic"
 std::string_view region_name(RegionKind region);  ///< "zero", "one"
 std::optional<RegionKind> region_of_name(std::string_view name);
+/// Names of regions besides zero and one: 1 to 64 of A-Z, a-z, 0-9, _, space, dot and dash; not "zero",
+/// "one", "t", "." and "..".
+bool is_valid_region_name(std::string_view name);
 
 /// Where in a request document the field of an engine error stands: "deformation.axis" of an edit is
 /// "/deformation/axis/direction".

@@ -171,6 +171,7 @@ CLI::App* add_remote_commands(CLI::App& app, RemoteCommands& remote, std::string
   add_cloud_commands(app, remote);
   add_session_commands(app, remote);
   add_paint_command(app, remote);
+  add_region_commands(app, remote);
   add_edit_commands(app, remote);
   add_history_commands(app, remote);
   add_recipe_commands(app, remote);

@@ -13,6 +13,7 @@ struct Limits {
   std::uint64_t max_uploads = 64;
   std::uint64_t max_upload_file_bytes = 16ULL << 30U;
   std::uint64_t upload_expiry_s = 86'400;
+  std::uint64_t max_imports = 64;
   std::uint64_t max_samples = 20'000'000;
   std::uint64_t max_clouds = 64;
   std::uint64_t max_cloud_bytes = 4ULL << 30U;
@@ -28,6 +29,7 @@ struct Limits {
   std::uint64_t max_edits = 10'000;
   std::uint64_t max_operations = 10'000;
   std::uint64_t max_painting_vertices = 1'000'000;
+  std::uint64_t max_named_regions = 16;
   std::uint64_t max_kept_answers = 100'000;
   std::uint64_t session_idle_expiry_s = 0;
   std::uint64_t wake_wait_ms = 5'000;

@@ -1,3 +1,11 @@
+#include <chrono>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/core/execution_context.h"
 #include "engine/io/cloud_io.h"
 #include "server/handlers/cloud_file.h"
 #include "server/handlers/handlers.h"
@@ -32,9 +40,13 @@ Outcome<ImportRequest> import_request(const RequestHead& head) {
   return import;
 }
 
-/// The upload that a document names, taken for the import; it is removed where that succeeds.
-Outcome<SharedCloud> import_upload(Service& service, const Request& request,
-                                   const Seal<protocol::CloudDocument>& seal) {
+/// A complete upload that is to be a cloud.
+struct LeasedUpload {
+  std::shared_ptr<UploadStore::Lease> lease;
+  ImportRequest import;
+};
+/// The upload that the request's document names.
+Outcome<LeasedUpload> lease_upload(Service& service, const Request& request) {
   if (auto known = check_query(request.head, {}); !known.ok()) return known.problem();
   const auto asked = parsed_body(service, request, protocol::parse_import_cloud);
   if (!asked.ok()) return asked.problem();
@@ -50,34 +62,90 @@ Outcome<SharedCloud> import_upload(Service& service, const Request& request,
     }
     return problem;
   }
-  const UploadRecord record = lease.value()->record();
+  const UploadRecord& record = lease.value()->record();
   auto quota = service.access.hold(request.caller, Quota::kStoredBytes, record.length);
   if (!quota.ok()) return quota.problem();
-  const ImportRequest import{
+  ImportRequest import{
       .name = asked.value().name.value_or(protocol::is_valid_name(record.name) ? record.name : "cloud"),
       .drop_non_finite = asked.value().drop_non_finite,
       .format = asked.value().format,
       .owner = request.caller.token,
       .quota = std::move(quota.value())};
   if (auto room = service.clouds.check_room(); !room.ok()) return room.problem();
+  return LeasedUpload{.lease = std::move(lease.value()), .import = std::move(import)};
+}
+
+/// Imports the upload; it is removed where that succeeds.
+Outcome<SharedCloud> import_upload(Service& service, LeasedUpload& upload,
+                                   const Seal<protocol::CloudDocument>& seal,
+                                   const ExecutionContext* context) {
+  const UploadRecord record = upload.lease->record();
   auto cloud = import_cloud(service.clouds, service.decode_file, service.decode, service.background,
-                            service.config.limits, {lease.value()->file(), record.length}, import, seal);
-  lease.value().reset();
+                            service.config.limits, {upload.lease->file(), record.length}, upload.import, seal,
+                            context);
+  upload.lease.reset();
   // The cloud has all of it; where another request was quicker, it is gone already.
   if (cloud.ok()) static_cast<void>(service.uploads.remove(record.id).ok());
   return cloud;
 }
 
-Outcome<SharedCloud> import_body(Service& service, const Request& request,
-                                 const Seal<protocol::CloudDocument>& seal) {
+Outcome<ImportRequest> body_import(Service& service, const Request& request) {
   auto import = import_request(request.head);
   if (!import.ok()) return import.problem();
   auto quota = service.access.hold(request.caller, Quota::kStoredBytes, request.body.size());
   if (!quota.ok()) return quota.problem();
   import.value().owner = request.caller.token;
   import.value().quota = std::move(quota.value());
+  return import;
+}
+
+bool names_upload(const RequestHead& head) {
+  return head.media_type() == "application/json";
+}
+
+/// Waits for it.
+Outcome<SharedCloud> import_now(Service& service, const Request& request,
+                                const Seal<protocol::CloudDocument>& seal) {
+  if (names_upload(request.head)) {
+    auto upload = lease_upload(service, request);
+    if (!upload.ok()) return upload.problem();
+    return import_upload(service, upload.value(), seal, nullptr);
+  }
+  const auto import = body_import(service, request);
+  if (!import.ok()) return import.problem();
   return import_cloud(service.clouds, service.decode, service.background, service.config.limits,
                       request.body_bytes(), import.value(), seal);
+}
+
+/// Leaves it to the imports, with all that it needs.
+Outcome<protocol::ImportDocument> import_later(Service& service, const Request& request) {
+  if (names_upload(request.head)) {
+    auto upload = lease_upload(service, request);
+    if (!upload.ok()) return upload.problem();
+    const auto held = std::make_shared<LeasedUpload>(std::move(upload.value()));
+    return service.imports.start(
+        {.name = held->import.name, .bytes = held->lease->record().length, .owner = request.caller.token},
+        [&service, held](const ExecutionContext& context) {
+          return import_upload(service, *held, {}, &context);
+        });
+  }
+  const auto import = body_import(service, request);
+  if (!import.ok()) return import.problem();
+  if (request.body.empty())
+    return Problem{.kind = ProblemKind::kEmptyBody, .detail = "the upload has no bytes"};
+  struct Body {
+    std::string bytes;
+    std::vector<std::shared_ptr<void>> memory;
+  };
+  const auto body =
+      std::make_shared<const Body>(Body{std::move(request.body), std::move(request.body_memory)});
+  return service.imports.start(
+      {.name = import.value().name, .bytes = body->bytes.size(), .owner = request.caller.token},
+      [&service, body, import = import.value()](const ExecutionContext& context) {
+        return import_cloud(service.clouds, service.decode, service.background, service.config.limits,
+                            std::as_bytes(std::span(body->bytes.data(), body->bytes.size())), import, {},
+                            &context);
+      });
 }
 
 }  // namespace
@@ -90,6 +158,13 @@ Response list_clouds(Service& service, const Request& request) {
 }
 
 Response upload_cloud(Service& service, const Request& request) {
+  if (prefers(request.head, "respond-async")) {
+    const auto import = import_later(service, request);
+    if (!import.ok()) return problem_response(import.problem(), request);
+    return json_response(protocol::to_json(import.value()), 202)
+        .with_header("Location", "/v1/imports/" + import.value().id)
+        .with_header("Preference-Applied", "respond-async");
+  }
   const auto begin = std::chrono::steady_clock::now();
   const auto answer = [](const protocol::CloudDocument& document) {
     return json_response(protocol::to_json(document), 201)
@@ -97,9 +172,7 @@ Response upload_cloud(Service& service, const Request& request) {
         .with_header("ETag", content_tag(document));
   };
   const auto seal = sealed<protocol::CloudDocument>(request, answer);
-  const bool names_upload = request.head.media_type() == "application/json";
-  const auto cloud =
-      names_upload ? import_upload(service, request, seal) : import_body(service, request, seal);
+  const auto cloud = import_now(service, request, seal);
   if (!cloud.ok()) return problem_response(cloud.problem(), request);
   Response response = answer_of(request, cloud.value()->document, answer);
   response.timings.emplace_back(

@@ -32,6 +32,10 @@ Response upload_cloud(Service& service, const Request& request);
 Response get_cloud(Service& service, const Request& request);
 Response get_cloud_data(Service& service, const Request& request);
 Response delete_cloud(Service& service, const Request& request);
+// imports.cpp
+Response list_imports(Service& service, const Request& request);
+Response get_import(Service& service, const Request& request);
+Response delete_import(Service& service, const Request& request);
 // uploads.cpp
 Response list_uploads(Service& service, const Request& request);
 Response create_upload(Service& service, const Request& request);
@@ -51,6 +55,7 @@ Response get_session(Service& service, const Request& request);
 Response patch_session(Service& service, const Request& request);
 Response delete_session(Service& service, const Request& request);
 // regions.cpp
+Response list_regions(Service& service, const Request& request);
 Response get_painting(Service& service, const Request& request);
 Response replace_painting(Service& service, const Request& request);
 Response clear_painting(Service& service, const Request& request);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 
 #include "protocol/frames/frame.h"
@@ -187,6 +188,20 @@ std::string download_name(const std::string& name, std::string_view extension) {
   }
   return "attachment; filename=\"" + (plain.empty() ? "cloud" : plain.substr(0, 80)) +
          std::string(extension) + "\"";
+}
+
+bool prefers(const RequestHead& head, std::string_view preference) {
+  std::string_view rest = head.header("prefer").value_or("");
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find(','), rest.size());
+    std::string_view one = rest.substr(0, std::min(rest.find(';'), end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    const std::size_t first = std::min(one.find_first_not_of(" \t"), one.size());
+    one.remove_prefix(first);
+    one = one.substr(0, one.find_last_not_of(" \t") + 1);
+    if (std::ranges::equal(one, preference, [](char a, char b) { return std::tolower(a) == b; })) return true;
+  }
+  return false;
 }
 
 }  // namespace pointwright::server

@@ -60,4 +60,7 @@ Response not_modified(const std::string& etag);
 /// Content-Disposition for a download: the name with everything unusual replaced.
 std::string download_name(const std::string& name, std::string_view extension);
 
+/// Whether the request prefers something (RFC 7240), such as "respond-async".
+bool prefers(const RequestHead& head, std::string_view preference);
+
 }  // namespace pointwright::server

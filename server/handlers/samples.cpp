@@ -77,22 +77,38 @@ std::string file_tag(std::uint64_t revision, const CloudFile& file, const View& 
 }
 
 /// Puts a column of the session's in place of the cloud's own of that name.
-void put_scalar(Cloud& cloud, const char* name, std::vector<float> values) {
+void put_scalar(Cloud& cloud, const char* name, ScalarAttribute::Values values) {
   std::erase_if(cloud.scalars, [&](const ScalarAttribute& scalar) { return scalar.name == name; });
   cloud.scalars.push_back({name, std::move(values)});
 }
 
-/// The surface as a cloud; with the detail of its level and what edits have done to its samples' cells as
-/// scalars where these are asked for by name.
-std::shared_ptr<const Cloud> cloud_of(const Picture& picture, const View& view, const FileOptions& options) {
+/// By sample: its index in the caller's order of the cloud; kNoParent for inserted ones.
+std::vector<std::uint32_t> cloud_indices(const RestModel& rest, const Cloud& cloud) {
+  std::vector<std::uint32_t> indices = cloud.id;
+  for (std::uint32_t& index : indices) {
+    if (index >= rest.uploaded_ids)
+      index = kNoParent;
+    else if (rest.cloud_index != nullptr)
+      index = (*rest.cloud_index)[index];
+  }
+  return indices;
+}
+
+/// The surface as a cloud; with the detail of its level, what edits have done to its samples' cells, and where
+/// its samples stand in the uploaded cloud as scalars where these are asked for by name.
+std::shared_ptr<const Cloud> cloud_of(const RestModel& rest, const Picture& picture, const View& view,
+                                      const FileOptions& options) {
   auto cloud = Session::edited_cloud(picture, view.level);
   const std::array measures{
       std::pair{"stretch", &StretchColumns::major}, std::pair{"minor_stretch", &StretchColumns::minor},
       std::pair{"anisotropy", &StretchColumns::anisotropy}, std::pair{"area_change", &StretchColumns::area}};
   const bool stretches =
       std::ranges::any_of(measures, [&](const auto& each) { return options.names(each.first); });
-  if (!options.names("detail") && !stretches) return cloud;
+  constexpr std::array<const char*, 3> axes{"stretch_x", "stretch_y", "stretch_z"};
+  const bool points = std::ranges::any_of(axes, [&](const char* name) { return options.names(name); });
+  if (!options.names("detail") && !options.names("cloud_index") && !stretches && !points) return cloud;
   Cloud with_scalars = *cloud;
+  if (options.names("cloud_index")) put_scalar(with_scalars, "cloud_index", cloud_indices(rest, *cloud));
   if (options.names("detail")) {
     std::vector<float> detail(with_scalars.size(), 0.0F);
     if (const auto bands = picture.surface->band_count(); bands > 0) {
@@ -106,6 +122,14 @@ std::shared_ptr<const Cloud> cloud_of(const Picture& picture, const View& view, 
     for (const auto& [name, column] : measures)
       if (options.names(name)) put_scalar(with_scalars, name, std::move(columns.*column));
   }
+  if (points) {
+    const Points direction = stretch_directions(*picture.samples->sampling);
+    const std::array columns{direction.x(), direction.y(), direction.z()};
+    for (std::size_t axis = 0; axis < axes.size(); ++axis)
+      if (options.names(axes[axis]))
+        put_scalar(with_scalars, axes[axis],
+                   std::vector<float>(columns[axis], columns[axis] + direction.size()));
+  }
   return std::make_shared<const Cloud>(std::move(with_scalars));
 }
 
@@ -118,7 +142,7 @@ Response file_response(Service& service, const Request& request, Session& sessio
   if (!picture.ok()) return problem_response(picture.problem(), request);
   file.etag = file_tag(picture.value().revision, file, view);
   return cloud_file_response(
-      service, request, [&] { return cloud_of(picture.value(), view, file.options); },
+      service, request, [&] { return cloud_of(session.rest(), picture.value(), view, file.options); },
       memory_of(picture.value().samples->cloud()), file);
 }
 

@@ -48,6 +48,7 @@ Service::Service(Config settings, ServiceParts parts)
       json_memory(config.limits.max_json_memory),
       answer_memory(config.limits.max_answer_memory),
       streams(config.limits.max_streams),
+      imports(config.limits, parts.report_failure),
       is_ready(archive == nullptr) {}
 
 std::vector<std::string> Service::recover() {

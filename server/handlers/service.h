@@ -23,6 +23,7 @@
 #include "server/store/data_folder.h"
 #include "server/store/database.h"
 #include "server/store/image_store.h"
+#include "server/store/import_store.h"
 #include "server/store/importer.h"
 #include "server/store/session_store.h"
 #include "server/store/upload_store.h"
@@ -70,6 +71,7 @@ class Service {
   Budget json_memory;    ///< of documents
   Budget answer_memory;  ///< of files and frames on their way out
   Budget streams;
+  ImportStore imports;  ///< they use all of the above
   std::atomic<bool> stopping{false};
   std::function<std::size_t()> connections;  ///< how many are served; set before the first request
   std::atomic<bool> is_ready;                ///< clouds, images and sessions are known

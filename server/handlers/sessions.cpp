@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "server/handlers/handlers.h"
 
 namespace pointwright::server {
@@ -5,13 +7,14 @@ namespace {
 
 /// What a session on the cloud takes of the caller's quotas.
 Outcome<std::shared_ptr<const void>> hold_session(Service& service, const Caller& caller,
-                                                  const std::string& cloud_id) {
-  const SharedCloud cloud = service.clouds.find(cloud_id);
+                                                  const protocol::CreateSessionRequest& asked) {
+  const SharedCloud cloud = service.clouds.find(asked.cloud);
   // create() says so.
   if (cloud == nullptr || !caller.may_see(cloud->owner)) return std::shared_ptr<const void>();
   auto session = service.access.hold(caller, Quota::kSessions, 1);
   if (!session.ok()) return session.problem();
-  auto samples = service.access.hold(caller, Quota::kSamples, cloud->document.report.sample_count);
+  const std::uint64_t whole = cloud->document.report.sample_count;
+  auto samples = service.access.hold(caller, Quota::kSamples, std::min(whole, asked.preview.value_or(whole)));
   if (!samples.ok()) return samples.problem();
   return std::shared_ptr<const void>(
       std::make_shared<const std::pair<QuotaHold, QuotaHold>>(session.value(), samples.value()));
@@ -29,7 +32,7 @@ Response list_sessions(Service& service, const Request& request) {
 Response create_session(Service& service, const Request& request) {
   const auto body = parsed_body(service, request, protocol::parse_create_session);
   if (!body.ok()) return problem_response(body.problem(), request);
-  const auto quota = hold_session(service, request.caller, body.value().cloud);
+  const auto quota = hold_session(service, request.caller, body.value());
   if (!quota.ok()) return problem_response(quota.problem(), request);
   using Made = std::shared_ptr<Session>;
   const auto answer = [](const Made& session) {

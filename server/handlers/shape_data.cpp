@@ -28,7 +28,8 @@ Outcome<Done> find_data(const Service& service, const Caller& caller, const Sess
     if (!samples.ok()) return samples.problem();
     shape->cloud = std::move(samples.value());
   }
-  if (needs_texcoord(operation.shape) && session.cloud().texcoord.empty())
+  const SharedSamples own = session.document()->surface.samples;  // null: the session is not ready
+  if (needs_texcoord(operation.shape) && own != nullptr && own->cloud().texcoord.empty())
     return refused("/shape/projection", "the session's cloud has no texture coordinates");
   return Done{};
 }

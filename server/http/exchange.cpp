@@ -158,8 +158,8 @@ std::optional<Problem> Exchange::read_body(const Endpoint& endpoint, Request& re
                           Clock::now() + options.write_grace);
   const auto hold = [&](std::uint64_t bytes) {
     if (endpoint.body_memory == nullptr) return true;
-    body_memory_.push_back(endpoint.body_memory->hold(bytes));
-    return body_memory_.back() != nullptr;
+    request.body_memory.push_back(endpoint.body_memory->hold(bytes));
+    return request.body_memory.back() != nullptr;
   };
   const Connection::BodyPace pace{.grace = options.body_grace, .least_rate = options.least_body_rate};
   std::uint64_t count = 0;
@@ -223,7 +223,6 @@ Response Exchange::answer() {
   Response response;
   try {
     response = dispatch();
-    body_memory_.clear();
   } catch (const std::bad_alloc&) {
     note_failure("out of memory");
     response = refuse(

@@ -71,7 +71,6 @@ class Exchange {
   std::variant<RequestHead, Problem> head_;
   std::string request_id_;
   RequestLog log_;
-  std::vector<std::shared_ptr<void>> body_memory_;  // until the answer is made
 };
 
 }  // namespace pointwright::server

@@ -57,8 +57,9 @@ struct Request {
   RequestHead head;
   std::string id;                     ///< X-Request-Id: the client's where it is well-formed, else a new one
   std::vector<std::string> captures;  ///< what the placeholders of the route matched
-  std::string body;
-  std::shared_ptr<BodyTarget> target = nullptr;  ///< where the body went, for routes that have one
+  mutable std::string body;  ///< a handler that goes on after its answer takes it, and the memory with it
+  mutable std::vector<std::shared_ptr<void>> body_memory = {};  ///< what the body is held from
+  std::shared_ptr<BodyTarget> target = nullptr;                 ///< where it went, for routes that have one
   Caller caller = {};
   mutable std::shared_ptr<KeyedRequest> keyed = nullptr;  ///< where it has an Idempotency-Key
 

@@ -202,6 +202,7 @@ int run_daemon(const Config& config) {
     service.stopping = true;
     const bool drained = server.stop(std::chrono::milliseconds(config.limits.shutdown_deadline_ms));
     service.sessions.close_all("the server is stopping");
+    service.imports.cancel_all();
     if (!drained) {
       log.write(LogLevel::kWarn, "stopped", {{"message", "some requests did not end in time"}});
     } else {

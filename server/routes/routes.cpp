@@ -35,6 +35,9 @@ constexpr std::array kRoutes = {
     Route{kGet, "/v1/clouds/{id}", Body::kNone, get_cloud},
     Route{kDelete, "/v1/clouds/{id}", Body::kNone, delete_cloud},
     Route{kGet, "/v1/clouds/{id}/data", Body::kNone, get_cloud_data},
+    Route{kGet, "/v1/imports", Body::kNone, list_imports},
+    Route{kGet, "/v1/imports/{id}", Body::kNone, get_import},
+    Route{kDelete, "/v1/imports/{id}", Body::kNone, delete_import},
     Route{kGet, "/v1/uploads", Body::kNone, list_uploads},
     Route{kPost, "/v1/uploads", Body::kUpload, create_upload, kOwner},
     Route{kGet, "/v1/uploads/{id}", Body::kNone, get_upload},
@@ -53,6 +56,7 @@ constexpr std::array kRoutes = {
     Route{kGet, "/v1/sessions/{id}/shares", Body::kNone, list_shares, kOwner},
     Route{kPost, "/v1/sessions/{id}/shares", Body::kJson, create_share, kOwner},
     Route{kDelete, "/v1/sessions/{id}/shares/{id}", Body::kNone, revoke_share, kOwner},
+    Route{kGet, "/v1/sessions/{id}/regions", Body::kNone, list_regions},
     Route{kGet, "/v1/sessions/{id}/regions/{region}", Body::kNone, get_painting},
     Route{kPut, "/v1/sessions/{id}/regions/{region}", Body::kLargeJson, replace_painting},
     Route{kDelete, "/v1/sessions/{id}/regions/{region}", Body::kNone, clear_painting},
@@ -78,7 +82,8 @@ constexpr Route kAssetRoute{kGet, "/{asset}", Body::kNone, get_asset, kOpen};
 
 bool fits(std::string_view placeholder, std::string_view text) {
   if (placeholder == "{id}") return protocol::is_valid_id(text);
-  if (placeholder == "{region}") return protocol::region_of_name(text).has_value();
+  if (placeholder == "{region}")
+    return protocol::region_of_name(text).has_value() || protocol::is_valid_region_name(text);
   if (placeholder == "{edit}")
     return !text.empty() && text.size() <= 9 &&
            text.find_first_not_of("0123456789") == std::string_view::npos;
@@ -170,6 +175,10 @@ std::optional<Problem> check_sight(Service& service, const Route& route,
     const SharedCloud cloud = service.clouds.find(captures.front());
     if (cloud == nullptr || !caller.may_see(cloud->owner)) return missing("there is no such cloud");
     owner = cloud->owner;
+  } else if (is_below("/v1/imports/{id}")) {
+    auto found = service.imports.owner_of(captures.front());
+    if (!found || !caller.may_see(*found)) return missing("there is no such import");
+    owner = std::move(*found);
   } else if (is_below("/v1/images/{id}")) {
     const SharedImage image = service.images.find(captures.front());
     if (image == nullptr || !caller.may_see(image->owner)) return missing("there is no such image");

@@ -38,6 +38,10 @@ class Remaking {
   [[nodiscard]] SharedMarks carried_here(const SampleSet& from, const SharedMarks& marks) const {
     return carried_marks(from, marks, *history_.current().samples, nullptr, shared_ids_);
   }
+  [[nodiscard]] SharedNamedRegions carried_here(const SampleSet& from,
+                                                const SharedNamedRegions& regions) const {
+    return carried_regions(from, regions, *history_.current().samples, shared_ids_);
+  }
 
  private:
   Outcome<SharedMarks> marks_of(std::size_t index) {
@@ -87,6 +91,7 @@ Outcome<SharedDocument> amend(Session& session, std::size_t edit, const std::opt
   }
   if (auto moved = fork.history.move_head(head); !moved) return protocol::to_problem(moved.error());
   Document document = *fork.document;
+  document.named = remaking.carried_here(*document.surface.samples, document.named);
   document.marks = remaking.carried_here(*document.surface.samples, document.marks);
   fork.document = std::make_shared<const Document>(std::move(document));
   return session.adopt(std::move(fork));

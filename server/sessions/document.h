@@ -5,24 +5,15 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "engine/editing/painting.h"
 #include "protocol/json/documents.h"
 #include "server/sessions/history.h"
+#include "server/sessions/named_regions.h"
+#include "server/sessions/painting.h"
 #include "server/sessions/surface_state.h"
 
 namespace pointwright::server {
-
-/// The operations of a painting. Lists share them: appending copies none.
-using OperationList = std::vector<std::shared_ptr<const PaintOperation>>;
-
-/// One region as it was painted.
-struct Painting {
-  std::size_t samples = 0;
-  std::size_t vertices = 0;  ///< of strokes and outlines, and balls
-  std::shared_ptr<const OperationList> operations;
-};
 
 struct Document {
   protocol::SessionState state = protocol::SessionState::kBuilding;
@@ -33,6 +24,7 @@ struct Document {
   std::shared_ptr<const Marks> marks = {};
   Painting zero = {};
   Painting one = {};
+  SharedNamedRegions named = {};
   std::shared_ptr<const EditList> edits = {};  ///< the undone ones included
   std::size_t head = 0;                        ///< edits that are applied
   protocol::ModelBounds bounds = {};           ///< of the committed surface

@@ -15,8 +15,8 @@ std::vector<PaintOperation> cover_of(const Session& session, const Points& posit
       members[i] = static_cast<std::uint8_t>((marks[i] & static_cast<unsigned>(kind)) != 0U);
   });
   // On a finer sampling the two covers may meet by less than a spacing: the one-region takes what is between.
-  return cover_operations(PaintMode::kAdd, members, position, session.cloud().origin,
-                          kind == RegionKind::kOne, &session.context());
+  return cover_operations(PaintMode::kAdd, members, position, session.rest().origin, kind == RegionKind::kOne,
+                          &session.context());
 }
 
 /// The marks of an edit on the samples that it left: what the next one is made with where nobody painted.

@@ -23,11 +23,20 @@ protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) 
   return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
 }
 
-Document starting_document(const SessionParams& params, const protocol::ModelBounds& bounds) {
+Document starting_document(const SessionParams& params) {
   Document document = params.kept != nullptr ? *params.kept : Document{};
   document.name = params.name;
-  document.bounds = bounds;
+  document.bounds =
+      params.preview ? params.preview->bounds : model_bounds(params.cloud->position, params.cloud->origin);
   return document;
+}
+
+/// The scales, which are fractions of the whole cloud's diagonal, as fractions of what was chosen of it.
+HierarchyParams fitted(const HierarchyParams& params, float whole, float chosen) {
+  HierarchyParams result = params;
+  if (!(chosen > 0.0F)) return params;
+  for (float& scale : result.scales) scale *= whole / chosen;
+  return validate(result) ? result : params;
 }
 
 float detail_range_of(const SurfaceState& state) {
@@ -43,11 +52,10 @@ Session::Session(SessionParams params, SessionServices services)
       services_(std::move(services)),
       strand_(services_.interactive),
       presence_(std::make_shared<Presence>([feed = feed_] { feed->notify(); })),
-      document_(std::make_shared<const Document>(
-          starting_document(params_, model_bounds(params_.cloud->position, params_.cloud->origin)))) {
+      document_(std::make_shared<const Document>(starting_document(params_))) {
   rest_ = RestModel{.params = params_.hierarchy,
-                    .origin = params_.cloud->origin,
-                    .diagonal = bounds_of(params_.cloud->position).diagonal(),
+                    .origin = params_.preview ? params_.preview->origin : params_.cloud->origin,
+                    .diagonal = params_.preview ? 0.0F : bounds_of(params_.cloud->position).diagonal(),
                     .build = services_.build,
                     .resample = services_.resample,
                     .room = params_.room};
@@ -67,11 +75,30 @@ std::shared_ptr<Session> Session::create(SessionParams params, SessionServices s
   return session;
 }
 
-void Session::build() {
+Outcome<std::shared_ptr<const Cloud>> Session::chosen_samples() {
+  if (!params_.preview) return params_.cloud;
   const auto begin = SteadyClock::now();
+  context_.begin_phase("subsample", 0.0);
+  auto chosen = params_.preview->choose(context_);
+  if (!chosen.ok()) return chosen.problem();
+  const float diagonal = bounds_of(chosen.value().cloud->position).diagonal();
+  rest_.params = fitted(params_.hierarchy, params_.preview->diagonal, diagonal);
+  rest_.diagonal = diagonal;
+  rest_.cloud_index = std::move(chosen.value().cloud_index);
+  note_time("subsample", begin);
+  return std::move(chosen.value().cloud);
+}
+
+void Session::build() {
+  std::shared_ptr<const Cloud> cloud;
   std::shared_ptr<Result<Hierarchy>> built;
   try {
-    built = std::make_shared<Result<Hierarchy>>(rest_.build(*params_.cloud, params_.hierarchy, context_));
+    auto samples = chosen_samples();
+    if (!samples.ok()) return fail(samples.problem());
+    cloud = std::move(samples.value());
+    const auto begin = SteadyClock::now();
+    built = std::make_shared<Result<Hierarchy>>(rest_.build(*cloud, rest_.params, context_));
+    note_time("build", begin);
   } catch (const std::bad_alloc&) {
     fail({.kind = ProblemKind::kOutOfSpace, .detail = "the server has no memory for this hierarchy"});
     throw;
@@ -80,8 +107,7 @@ void Session::build() {
     fail({.kind = ProblemKind::kInternalError, .detail = "building failed; the log says why"});
     throw;
   }
-  note_time("build", begin);
-  finish_building(std::move(*built));
+  finish_building(std::move(cloud), std::move(*built));
 }
 
 void Session::fail(Problem problem) {
@@ -91,12 +117,13 @@ void Session::fail(Problem problem) {
   publish(std::move(failed));
 }
 
-void Session::finish_building(Result<Hierarchy> built) {
+void Session::finish_building(std::shared_ptr<const Cloud> cloud, Result<Hierarchy> built) {
   if (!built) return fail(protocol::to_problem(built.error()));
   Document document = *this->document();
+  document.bounds = model_bounds(cloud->position, cloud->origin);
   Hierarchy hierarchy = std::move(built).value();
   const SharedSamples samples = samples_at_rest(
-      rest_sampling(params_.cloud, std::make_shared<const NeighborGraph>(std::move(hierarchy.graph)),
+      rest_sampling(std::move(cloud), std::make_shared<const NeighborGraph>(std::move(hierarchy.graph)),
                     std::move(hierarchy.spacing)),
       hierarchy.surface.finest());
   document.spacing = median(samples->sampling->spacing);
@@ -118,7 +145,7 @@ void Session::finish_building(Result<Hierarchy> built) {
   if (params_.kept != nullptr) {
     if (auto problem = bring_back(document)) return fail(std::move(*problem));
   } else {
-    document.marks = std::make_shared<Marks>(params_.cloud->size(), std::uint8_t{0});
+    document.marks = std::make_shared<Marks>(samples->size(), std::uint8_t{0});
     document.zero.operations = document.one.operations = std::make_shared<const OperationList>();
     document.edits = std::make_shared<const EditList>();
   }
@@ -154,6 +181,8 @@ void Session::note_time(const std::string& name, SteadyClock::time_point begin) 
 
 protocol::SessionDocument Session::describe(const Document& document) const {
   const bool is_ready = document.state == protocol::SessionState::kReady;
+  const std::uint64_t first = params_.preview ? params_.preview->size.count : params_.cloud->size();
+  const float diagonal = params_.preview ? params_.preview->diagonal : rest_.diagonal;
   protocol::SessionDocument result;
   result.summary = {.id = params_.id,
                     .name = document.name,
@@ -161,17 +190,23 @@ protocol::SessionDocument Session::describe(const Document& document) const {
                     .state = document.state,
                     .revision = document.revision,
                     .created = params_.created,
-                    .sample_count = is_ready ? document.surface.samples->size() : params_.cloud->size()};
+                    .sample_count = is_ready ? document.surface.samples->size() : first};
+  if (params_.preview) result.summary.preview = params_.preview->size;
   result.progress = context_.progress();
   result.error = document.error;
-  result.origin = params_.cloud->origin;
+  result.origin = rest_.origin;
   result.bounds = document.bounds;
   for (const float scale : params_.hierarchy.scales)
-    result.level_scales.push_back(static_cast<double>(scale) * static_cast<double>(rest_.diagonal));
+    result.level_scales.push_back(static_cast<double>(scale) * static_cast<double>(diagonal));
   result.level_scales.push_back(0.0);
   if (document.edits != nullptr) {
     result.zero = {.samples = document.zero.samples, .operations = document.zero.operations->size()};
     result.one = {.samples = document.one.samples, .operations = document.one.operations->size()};
+    if (document.named != nullptr)
+      for (const auto& [name, region] : *document.named)
+        result.named.push_back({.name = name,
+                                .region = {.samples = region.painting.samples,
+                                           .operations = region.painting.operations->size()}});
     result.head = static_cast<std::uint32_t>(document.head);
     result.edits = static_cast<std::uint32_t>(document.edits->size());
   }

@@ -40,11 +40,9 @@ class Session : public std::enable_shared_from_this<Session> {
   [[nodiscard]] std::string name() const { return document()->name; }
   [[nodiscard]] const std::string& owner() const { return params_.owner; }
   [[nodiscard]] const std::string& cloud_id() const { return params_.cloud_id; }
-  [[nodiscard]] const Cloud& cloud() const { return *params_.cloud; }  ///< as it was uploaded
   [[nodiscard]] const SessionParams& params() const { return params_; }
-  [[nodiscard]] const RestModel& rest() const { return rest_; }  ///< Pre: the session is ready
-  /// Cancelled when the session is closed.
-  [[nodiscard]] const ExecutionContext& context() const { return context_; }
+  [[nodiscard]] const RestModel& rest() const { return rest_; }               ///< Pre: the session is ready
+  [[nodiscard]] const ExecutionContext& context() const { return context_; }  ///< cancelled by close()
   [[nodiscard]] SharedDocument document() const;
   [[nodiscard]] protocol::SessionDocument describe(const Document& document) const;
   [[nodiscard]] Progress progress() const { return context_.progress(); }
@@ -60,11 +58,12 @@ class Session : public std::enable_shared_from_this<Session> {
   using Expected = std::optional<std::uint64_t>;
   /// Paints one operation and appends it to the region's painting as it is recorded: resolved(). Problems:
   /// wrong state, too many operations or vertices; of this and all other changes: those of the keeper.
-  Outcome<Painted> paint(RegionKind kind, const PaintOperation& operation, Expected expected = {},
+  Outcome<Painted> paint(const RegionId& region, const PaintOperation& operation, Expected expected = {},
                          const Seal<Painted>& seal = {});
   /// Replaces a region's whole painting; none: clears it.
-  Outcome<Painted> replace_painting(RegionKind kind, const std::vector<PaintOperation>& operations,
+  Outcome<Painted> replace_painting(const RegionId& region, const std::vector<PaintOperation>& operations,
                                     Expected expected = {}, const Seal<Painted>& seal = {});
+  Outcome<Painted> remove_region(const std::string& name, Expected expected);  ///< problem: not found
 
   /// Asks for a preview to be shown. Returns once it is known to be possible; it is computed afterwards,
   /// unless a newer one replaces it before.
@@ -125,8 +124,9 @@ class Session : public std::enable_shared_from_this<Session> {
  private:
   Session(SessionParams params, SessionServices services);
   // Everything below runs on the strand, except where it says otherwise.
-  void build();  // on the background pool, as the next four
-  void finish_building(Result<Hierarchy> built);
+  void build();  // on the background pool, as the next five
+  Outcome<std::shared_ptr<const Cloud>> chosen_samples();
+  void finish_building(std::shared_ptr<const Cloud> cloud, Result<Hierarchy> built);
   std::optional<protocol::Problem> bring_back(Document& document);
   std::optional<protocol::Problem> replay(const RecordedEdit& record);
   void fail(protocol::Problem problem);  // while building
@@ -147,7 +147,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Outcome<SurfaceState> compute(const EditParams& params, ResamplingEffort effort);
   void forget_drag();
   void take_over_history(Document& document, const History& history) const;
-  Outcome<Painted> repaint(RegionKind kind, const std::vector<PaintOperation>& operations, bool append,
+  Outcome<Painted> repaint(const RegionId& region, const std::vector<PaintOperation>& operations, bool append,
                            Expected expected, const Seal<Painted>& seal);
   [[nodiscard]] std::optional<Outcome<Done>> known_verdict(const Document& document,
                                                            const EditParams& params) const;

@@ -31,36 +31,80 @@ Outcome<Done> Session::keep(const Document& before, const Document& after, const
   return params_.keeper->keep(before, after, &answer);
 }
 
-Outcome<Session::Painted> Session::paint(RegionKind kind, const PaintOperation& operation, Expected expected,
-                                         const Seal<Painted>& seal) {
+Outcome<Session::Painted> Session::paint(const RegionId& region, const PaintOperation& operation,
+                                         Expected expected, const Seal<Painted>& seal) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
-  return on_strand([&, this] { return repaint(kind, {operation}, true, expected, seal); });
+  return on_strand([&, this] { return repaint(region, {operation}, true, expected, seal); });
 }
 
-Outcome<Session::Painted> Session::replace_painting(RegionKind kind,
+Outcome<Session::Painted> Session::replace_painting(const RegionId& region,
                                                     const std::vector<PaintOperation>& operations,
                                                     Expected expected, const Seal<Painted>& seal) {
   auto ready = ready_document();
   if (!ready.ok()) return ready.problem();
-  return on_strand([&, this] { return repaint(kind, operations, false, expected, seal); });
+  return on_strand([&, this] { return repaint(region, operations, false, expected, seal); });
 }
 
-Outcome<Session::Painted> Session::repaint(RegionKind kind, const std::vector<PaintOperation>& operations,
-                                           bool append, Expected expected, const Seal<Painted>& seal) {
+Outcome<Session::Painted> Session::remove_region(const std::string& name, Expected expected) {
+  auto ready = ready_document();
+  if (!ready.ok()) return ready.problem();
+  return on_strand([&, this]() -> Outcome<Painted> {
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    if (auto current = check_revision(expected); !current.ok()) return current.problem();
+    const SharedDocument before = document();
+    NamedRegions named = before->named == nullptr ? NamedRegions{} : *before->named;
+    Painted result;
+    if (const auto found = named.find(name); found != named.end()) {
+      result.changed = found->second.painting.samples;
+      named.erase(found);
+    } else {
+      return Problem{.kind = ProblemKind::kNotFound, .detail = "the session has no region of that name"};
+    }
+    Document after = *before;
+    after.named = std::make_shared<const NamedRegions>(std::move(named));
+    ++after.revision;
+    result.document = std::make_shared<const Document>(std::move(after));
+    if (auto kept = keep<Painted>(*before, *result.document, {}, result); !kept.ok()) return kept.problem();
+    publish(result.document);
+    return result;
+  });
+}
+
+Outcome<Session::Painted> Session::repaint(const RegionId& region,
+                                           const std::vector<PaintOperation>& operations, bool append,
+                                           Expected expected, const Seal<Painted>& seal) {
   if (auto open = check_open(); !open.ok()) return open.problem();
   if (auto current = check_revision(expected); !current.ok()) return current.problem();
   const auto begin = SteadyClock::now();
+  const SharedDocument before = document();
+  if (!region.kind) {
+    auto painted = painted_region(params_, *before, region.name, operations, append, context_);
+    if (!painted.ok()) return painted.problem();
+    if (auto open = check_open(); !open.ok()) return open.problem();
+    Document after = *before;
+    after.named = std::move(painted.value().regions);
+    ++after.revision;
+    const Painted result{.document = std::make_shared<const Document>(std::move(after)),
+                         .changed = painted.value().changed};
+    if (auto kept = keep(*before, *result.document, seal, result); !kept.ok()) return kept.problem();
+    publish(result.document);
+    note_time("paint", begin);
+    return result;
+  }
+  const RegionKind kind = *region.kind;
   // What a drag shares belongs to the regions as they were.
   forget_drag();
-  const SharedDocument before = document();
   auto marks = std::make_shared<Marks>(*before->marks);
   if (!append)
     for (std::uint8_t& mark : *marks) mark = static_cast<std::uint8_t>(mark & ~static_cast<unsigned>(kind));
   const bool is_zero = kind == RegionKind::kZero;
   Painter painter(params_, paint_surface(before->surface), append || !is_zero ? before->zero : Painting{},
                   append || is_zero ? before->one : Painting{});
-  for (const PaintOperation& operation : operations) {
+  for (std::size_t i = 0; i < operations.size(); ++i) {
+    PaintOperation operation = operations[i];
+    const std::string pointer = append ? "" : "/operations/" + std::to_string(i);
+    if (auto found = find_region(*before, pointer, operation); !found.ok()) return found.problem();
     if (auto painted = painter.paint(kind, operation, *marks, context_); !painted.ok())
       return painted.problem();
     if (auto open = check_open(); !open.ok()) return open.problem();
@@ -120,12 +164,14 @@ Outcome<Session::Committed> Session::commit(const EditParams& params, Expected e
   });
 }
 
-// What a document says of the history, and of the marks that are in it already; one revision on.
+// What a document says of the history, of the marks that are in it already, and of the named regions on other
+// samples; one revision on.
 void Session::take_over_history(Document& document, const History& history) const {
+  document.named = carried_regions(*document.surface.samples, document.named, *history.current().samples);
   document.surface = history.current();
   document.edits = std::make_shared<const EditList>(history.edits());
   document.head = history.head();
-  document.bounds = model_bounds(document.surface.surface->finest().position, params_.cloud->origin);
+  document.bounds = model_bounds(document.surface.surface->finest().position, rest_.origin);
   document.spacing = median(document.surface.samples->sampling->spacing);
   document.zero.samples = count_marked(*document.marks, RegionKind::kZero);
   document.one.samples = count_marked(*document.marks, RegionKind::kOne);
@@ -252,7 +298,8 @@ std::shared_ptr<const Cloud> Session::edited_cloud(const Picture& picture, std::
 }
 
 std::uint16_t Session::available_attributes(std::uint16_t asked) const {
-  if (params_.cloud->has_colors()) return asked;
+  const SharedSamples samples = document()->surface.samples;
+  if (samples != nullptr && samples->cloud().has_colors()) return asked;
   return static_cast<std::uint16_t>(asked & ~unsigned{protocol::kFrameColor});
 }
 

@@ -75,6 +75,8 @@ std::optional<Problem> Session::bring_back(Document& document) {
     return Problem{.kind = ProblemKind::kDamaged, .detail = "the painting of the session is damaged"};
   }
   take_over_history(document, *history_);
+  // Those that were kept are of the samples that there are now.
+  document.named = recounted(kept.named, *document.surface.samples);
   document.revision = kept.revision;
   note_time("replay", begin);
   return std::nullopt;

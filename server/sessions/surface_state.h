@@ -34,6 +34,8 @@ struct RestModel {
   Vec3d origin = Vec3d::Zero();
   float diagonal = 0.0F;           ///< of the rest cloud: what the scales are fractions of
   std::uint32_t uploaded_ids = 0;  ///< ids from this on are those of inserted samples
+  /// ChosenSamples::cloud_index; null where the session has all samples of its cloud.
+  std::shared_ptr<const std::vector<std::uint32_t>> cloud_index = {};
   HierarchyBuilder build;
   Resampler resample;
   std::shared_ptr<SampleRoom> room;

@@ -129,10 +129,12 @@ protocol::ImageDocument image_document(const std::string& id, const std::string&
 std::string params_row(const KeptSession& session) {
   JsonDocument scales = JsonDocument::array();
   for (const float scale : session.params.scales) scales.push_back(double{scale});
-  return protocol::to_text(JsonDocument{{"name", session.name},
-                                        {"scales", std::move(scales)},
-                                        {"neighbors", session.params.neighbors},
-                                        {"created", to_ms(session.created)}});
+  JsonDocument row{{"name", session.name},
+                   {"scales", std::move(scales)},
+                   {"neighbors", session.params.neighbors},
+                   {"created", to_ms(session.created)}};
+  if (session.preview) row["preview"] = {{"count", session.preview->count}, {"of", session.preview->of}};
+  return protocol::to_text(row);
 }
 
 void read_params(KeptSession& session, const std::string& text) {
@@ -140,6 +142,9 @@ void read_params(KeptSession& session, const std::string& text) {
   session.name = row.at("name").get<std::string>();
   session.created = from_ms(row.at("created").get<std::int64_t>());
   session.params.neighbors = row.at("neighbors").get<std::uint32_t>();
+  if (const auto preview = row.find("preview"); preview != row.end())
+    session.preview = {.count = preview->at("count").get<std::uint64_t>(),
+                       .of = preview->at("of").get<std::uint64_t>()};
   session.params.scales.clear();
   for (const Json& scale : row.at("scales"))
     session.params.scales.push_back(static_cast<float>(scale.get<double>()));

@@ -52,8 +52,9 @@ struct KeptSession {
   std::uint64_t revision = 0;
   std::uint64_t head = 0;
   std::uint64_t samples = 0;
-  std::optional<std::string> damage;       ///< why it is not served
-  std::shared_ptr<const void> quota = {};  ///< its part of the owner's; not kept
+  std::optional<protocol::PreviewSize> preview = std::nullopt;  ///< none: all samples of the cloud
+  std::optional<std::string> damage;                            ///< why it is not served
+  std::shared_ptr<const void> quota = {};                       ///< its part of the owner's; not kept
 };
 
 /// Thread-safe. Changes are on the disk when they return. Problems of all changes: out of disk, storage

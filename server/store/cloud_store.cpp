@@ -160,6 +160,13 @@ Outcome<std::shared_ptr<const Cloud>> CloudStore::samples_of(const StoredCloud& 
   return cloud.cloud_;
 }
 
+void CloudStore::let_go(const StoredCloud& cloud) const {
+  const std::lock_guard lock(cloud.mutex_);
+  if (archive_ == nullptr || !load_ || cloud.cloud_.use_count() != 1) return;
+  cloud.cloud_.reset();
+  cloud.memory_.reset();
+}
+
 std::shared_ptr<const void> CloudStore::use(const std::string& id) const {
   const std::lock_guard lock(mutex_);
   const auto it = std::find_if(clouds_.begin(), clouds_.end(), has_id(id));

@@ -69,6 +69,8 @@ class CloudStore {
   [[nodiscard]] SharedCloud find(const std::string& sha256, const std::string& name) const;
   /// Its samples, from the archive where they are not there. Problems: damaged, out of space, overloaded.
   [[nodiscard]] Outcome<std::shared_ptr<const Cloud>> samples_of(const StoredCloud& cloud) const;
+  /// Lets the samples go where nobody else has them and the archive gives them again.
+  void let_go(const StoredCloud& cloud) const;
   /// Marks the cloud as used until the returned handle is gone; null for an unknown id.
   [[nodiscard]] std::shared_ptr<const void> use(const std::string& id) const;
   [[nodiscard]] std::vector<SharedCloud> list() const;  ///< oldest first

@@ -17,21 +17,21 @@ using protocol::ProblemKind;
 
 Decoder confined_decoder(std::shared_ptr<DecodeSlots> slots) {
   return [slots = std::move(slots)](std::span<const std::byte> bytes, CloudFormat format,
-                                    const ImportParams& params) {
+                                    const ImportParams& params, const ExecutionContext* context) {
     ConfineLimits confine;
     confine.slots = slots.get();
-    return decode_confined(bytes, format, params, confine);
+    return decode_confined(bytes, format, params, confine, context);
   };
 }
 
 FileDecoder confined_file_decoder(std::shared_ptr<DecodeSlots> slots) {
   return [slots = std::move(slots)](int file, std::uint64_t byte_count, CloudFormat format,
-                                    const ImportParams& params) {
+                                    const ImportParams& params, const ExecutionContext* context) {
     constexpr double kBytesPerSecond = 16.0 * 1024 * 1024;
     ConfineLimits confine;
     confine.slots = slots.get();
     confine.deadline_seconds += static_cast<double>(byte_count) / kBytesPerSecond;
-    return decode_confined(file, byte_count, format, params, confine);
+    return decode_confined(file, byte_count, format, params, confine, context);
   };
 }
 
@@ -75,16 +75,27 @@ struct Source {
 
 Outcome<SharedCloud> import_source(CloudStore& store, ComputePool& pool, const Limits& limits,
                                    const Source& source, const ImportRequest& request,
-                                   const Seal<protocol::CloudDocument>& seal) {
+                                   const Seal<protocol::CloudDocument>& seal,
+                                   const ExecutionContext* context) {
+  const auto begins = [&](const char* phase, double done) {
+    if (context == nullptr) return true;
+    context->begin_phase(phase, done);
+    return !context->is_cancelled();
+  };
   if (source.content.size == 0)
     return Problem{.kind = ProblemKind::kEmptyBody, .detail = "the upload has no bytes"};
   const auto format = format_of(source.start, request);
   if (!format) return protocol::to_problem(format.error());
   const ImportParams params{.max_samples = limits.max_samples, .drop_non_finite = request.drop_non_finite};
-  auto imported = finished(pool, source.decode(format.value(), params), params);
+  if (!begins("decoding", 0.05)) return protocol::to_problem(cancelled_error());
+  auto decoded = source.decode(format.value(), params);
+  if (!begins("ordering", 0.6)) return protocol::to_problem(cancelled_error());
+  auto imported = finished(pool, std::move(decoded), params);
   if (!imported.ok()) return imported.problem();
+  if (!begins("hashing", 0.8)) return protocol::to_problem(cancelled_error());
   const auto sha256 = source.sha256();
   if (!sha256.ok()) return sha256.problem();
+  if (!begins("storing", 0.9)) return protocol::to_problem(cancelled_error());
   NewCloud cloud{.document = {.id = random_id(),
                               .name = request.name,
                               .sha256 = sha256.value(),
@@ -116,8 +127,8 @@ CloudLoader cloud_loader(FileDecoder decode_file, Decoder decode, ComputePool& p
         }))
       return unreadable();
     auto imported = finished(pool,
-                             decode_file ? decode_file(file.file, file.size, source.format, params)
-                                         : decode(bytes, source.format, params),
+                             decode_file ? decode_file(file.file, file.size, source.format, params, nullptr)
+                                         : decode(bytes, source.format, params, nullptr),
                              params);
     if (!imported.ok()) return imported.problem();
     return std::move(imported.value().cloud);
@@ -126,18 +137,21 @@ CloudLoader cloud_loader(FileDecoder decode_file, Decoder decode, ComputePool& p
 
 Outcome<SharedCloud> import_cloud(CloudStore& store, const Decoder& decode, ComputePool& pool,
                                   const Limits& limits, std::span<const std::byte> bytes,
-                                  const ImportRequest& request, const Seal<protocol::CloudDocument>& seal) {
+                                  const ImportRequest& request, const Seal<protocol::CloudDocument>& seal,
+                                  const ExecutionContext* context) {
   const Source source{
       .start = bytes,
       .content = bytes,
-      .decode = [&](CloudFormat format, const ImportParams& params) { return decode(bytes, format, params); },
+      .decode = [&](CloudFormat format,
+                    const ImportParams& params) { return decode(bytes, format, params, context); },
       .sha256 = [&] { return Outcome<std::string>(sha256_hex(bytes)); }};
-  return import_source(store, pool, limits, source, request, seal);
+  return import_source(store, pool, limits, source, request, seal, context);
 }
 
 Outcome<SharedCloud> import_cloud(CloudStore& store, const FileDecoder& decode_file, const Decoder& decode,
                                   ComputePool& pool, const Limits& limits, const BlobContent& file,
-                                  const ImportRequest& request, const Seal<protocol::CloudDocument>& seal) {
+                                  const ImportRequest& request, const Seal<protocol::CloudDocument>& seal,
+                                  const ExecutionContext* context) {
   std::vector<std::byte> start;
   const auto append = [&](std::span<const std::byte> piece) {
     start.insert(start.end(), piece.begin(), piece.end());
@@ -155,10 +169,11 @@ Outcome<SharedCloud> import_cloud(CloudStore& store, const FileDecoder& decode_f
     return to_hex(digest.finish());
   };
   const auto decode_it = [&](CloudFormat format, const ImportParams& params) {
-    return decode_file ? decode_file(file.file, file.size, format, params) : decode(start, format, params);
+    return decode_file ? decode_file(file.file, file.size, format, params, context)
+                       : decode(start, format, params, context);
   };
   const Source source{.start = start, .content = file, .decode = decode_it, .sha256 = hash};
-  return import_source(store, pool, limits, source, request, seal);
+  return import_source(store, pool, limits, source, request, seal, context);
 }
 
 }  // namespace pointwright::server

@@ -69,7 +69,23 @@ CREATE TABLE answers (
 CREATE INDEX answers_by_age ON answers (created);
 )sql";
 
-constexpr std::array kSteps{kResources, kAnswers};
+constexpr std::string_view kRegions = R"sql(
+CREATE TABLE regions (
+  session TEXT NOT NULL REFERENCES sessions (id) ON DELETE CASCADE,
+  name TEXT NOT NULL,       -- of a region besides zero and one
+  members BLOB NOT NULL,    -- by id of the sample
+  seal TEXT NOT NULL,
+  PRIMARY KEY (session, name)
+);
+CREATE TABLE region_operations (
+  session TEXT NOT NULL, region TEXT NOT NULL, number INTEGER NOT NULL,
+  operation TEXT NOT NULL, seal TEXT NOT NULL,
+  UNIQUE (session, region, number),
+  FOREIGN KEY (session, region) REFERENCES regions (session, name) ON DELETE CASCADE
+);
+)sql";
+
+constexpr std::array kSteps{kResources, kAnswers, kRegions};
 
 }  // namespace
 

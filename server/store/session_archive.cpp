@@ -26,14 +26,23 @@ Problem damaged(const std::string& what) {
   return {.kind = ProblemKind::kDamaged, .detail = "what is stored of the session is damaged: " + what};
 }
 
-std::string session_seal(const std::string& id, std::uint64_t revision, std::size_t head, std::size_t zero,
-                         std::size_t one, std::size_t edits) {
-  return row_seal({id, std::to_string(revision), std::to_string(head), std::to_string(zero),
-                   std::to_string(one), std::to_string(edits)});
-}
-
 std::size_t size_of(const Painting& painting) {
   return painting.operations == nullptr ? 0 : painting.operations->size();
+}
+
+/// Which rows the session has.
+std::string session_seal(const std::string& id, const Document& document) {
+  const std::string revision = std::to_string(document.revision);
+  const std::string head = std::to_string(document.head);
+  const std::string zero = std::to_string(size_of(document.zero));
+  const std::string one = std::to_string(size_of(document.one));
+  const std::string edits = std::to_string(document.edits->size());
+  if (document.named == nullptr || document.named->empty())
+    return row_seal({id, revision, head, zero, one, edits});
+  std::string named;
+  for (const auto& [name, region] : *document.named)
+    named += name + "=" + std::to_string(size_of(region.painting)) + ";";
+  return row_seal({id, revision, head, zero, one, edits, named});
 }
 
 /// How many entries two lists start with in common.
@@ -105,34 +114,55 @@ std::vector<EditRow> new_edits(const EditList& edits, std::size_t known) {
   return rows;
 }
 
-void write_painting(Database::Access& access, const std::string& id, RegionKind kind, const Painting& before,
-                    const Painting& after) {
+/// Where the operations of regions stand: those of zero and one by number, others by name.
+struct OperationTable {
+  std::string_view forget;
+  std::string_view insert;
+  std::string_view select;
+};
+constexpr OperationTable kOperations{
+    .forget = "DELETE FROM operations WHERE session = ? AND region = ? AND number >= ?",
+    .insert = "INSERT INTO operations (session, region, number, operation, seal) VALUES (?, ?, ?, ?, ?)",
+    .select =
+        "SELECT number, operation, seal FROM operations WHERE session = ? AND region = ? ORDER BY number"};
+constexpr OperationTable kRegionOperations{
+    .forget = "DELETE FROM region_operations WHERE session = ? AND region = ? AND number >= ?",
+    .insert =
+        "INSERT INTO region_operations (session, region, number, operation, seal) VALUES (?, ?, ?, ?, ?)",
+    .select =
+        "SELECT number, operation, seal FROM region_operations WHERE session = ? AND region = ? "
+        "ORDER BY number"};
+
+std::string text_of(std::int64_t region) {
+  return std::to_string(region);
+}
+const std::string& text_of(const std::string& region) {
+  return region;
+}
+
+template <typename Region>
+void write_painting(Database::Access& access, const OperationTable& table, const std::string& id,
+                    const Region& region, const Painting& before, const Painting& after) {
   if (before.operations == after.operations) return;
-  const auto region = static_cast<std::int64_t>(kind);
   const std::size_t known = common_start(before.operations, after.operations);
-  if (known < size_of(before))
-    access.run("DELETE FROM operations WHERE session = ? AND region = ? AND number >= ?", id, region,
-               static_cast<std::int64_t>(known));
+  if (known < size_of(before)) access.run(table.forget, id, region, static_cast<std::int64_t>(known));
   for (std::size_t i = known; i < size_of(after); ++i) {
     const std::string text = protocol::to_text(protocol::to_json(*(*after.operations)[i]));
-    const std::string seal = row_seal({id, std::to_string(region), std::to_string(i), text});
-    access.run("INSERT INTO operations (session, region, number, operation, seal) VALUES (?, ?, ?, ?, ?)", id,
-               region, static_cast<std::int64_t>(i), text, seal);
+    const std::string seal = row_seal({id, text_of(region), std::to_string(i), text});
+    access.run(table.insert, id, region, static_cast<std::int64_t>(i), text, seal);
   }
 }
 
-Outcome<Painting> read_painting(Database::Access& access, const std::string& id, RegionKind kind) {
+template <typename Region>
+Outcome<Painting> read_painting(Database::Access& access, const OperationTable& table, const std::string& id,
+                                const Region& region) {
   auto operations = std::make_shared<OperationList>();
   Painting painting;
-  const auto region = static_cast<std::int64_t>(kind);
-  Statement row = access.query(
-      "SELECT number, operation, seal FROM operations WHERE session = ? AND region = ? ORDER BY number", id,
-      region);
+  Statement row = access.query(table.select, id, region);
   while (row.step()) {
     const std::string text = row.text(1);
     const bool is_next = static_cast<std::size_t>(row.integer(0)) == operations->size();
-    if (!is_next ||
-        row.text(2) != row_seal({id, std::to_string(region), std::to_string(operations->size()), text}))
+    if (!is_next || row.text(2) != row_seal({id, text_of(region), std::to_string(operations->size()), text}))
       return damaged("a painting");
     auto operation = protocol::parse_body(text, kNoLimits, protocol::parse_paint_operation);
     if (!operation) return damaged("a painting");
@@ -141,6 +171,56 @@ Outcome<Painting> read_painting(Database::Access& access, const std::string& id,
   }
   painting.operations = std::move(operations);
   return painting;
+}
+
+const NamedRegion* find(const SharedNamedRegions& regions, const std::string& name) {
+  if (regions == nullptr) return nullptr;
+  const auto found = regions->find(name);
+  return found == regions->end() ? nullptr : &found->second;
+}
+
+void write_regions(Database::Access& access, const std::string& id, const SharedNamedRegions& before,
+                   const SharedNamedRegions& after) {
+  if (before == after) return;
+  if (before != nullptr)
+    for (const auto& [name, region] : *before)
+      if (find(after, name) == nullptr)
+        access.run("DELETE FROM regions WHERE session = ? AND name = ?", id, name);
+  if (after == nullptr) return;
+  for (const auto& [name, region] : *after) {
+    const NamedRegion* const known = find(before, name);
+    if (known == nullptr || known->by_id != region.by_id) {
+      const std::vector<std::byte> members = encode_marks(*region.by_id);
+      // Not replaced: the operations refer to the row.
+      access.run(
+          "INSERT INTO regions (session, name, members, seal) VALUES (?1, ?2, ?3, ?4) ON CONFLICT (session, "
+          "name) DO UPDATE SET members = ?3, seal = ?4",
+          id, name, std::span<const std::byte>(members), row_seal({id, name, sha256_hex(members)}));
+    }
+    write_painting(access, kRegionOperations, id, name, known == nullptr ? Painting{} : known->painting,
+                   region.painting);
+  }
+}
+
+Outcome<SharedNamedRegions> read_regions(Database::Access& access, const std::string& id) {
+  NamedRegions regions;
+  {
+    Statement row = access.query("SELECT name, members, seal FROM regions WHERE session = ?", id);
+    while (row.step()) {
+      const std::string name = row.text(0);
+      if (row.text(2) != row_seal({id, name, sha256_hex(row.content(1))})) return damaged("a region");
+      auto members = shared_marks(row.content(1));
+      if (members == nullptr) return damaged("a region");
+      regions[name].by_id = std::move(members);
+    }
+  }
+  for (auto& [name, region] : regions) {
+    auto painting = read_painting(access, kRegionOperations, id, name);
+    if (!painting.ok()) return painting.problem();
+    region.painting = std::move(painting.value());
+  }
+  if (regions.empty()) return SharedNamedRegions();
+  return SharedNamedRegions(std::make_shared<const NamedRegions>(std::move(regions)));
 }
 
 Outcome<EditList> read_edits(Database::Access& access, const std::string& id) {
@@ -189,8 +269,7 @@ class Archive::Keeper : public SessionKeeper {
       runs = encode_marks(*after.marks);
       marks_seal = sha256_hex(runs);
     }
-    const std::string seal = session_seal(id_, after.revision, after.head, size_of(after.zero),
-                                          size_of(after.one), after.edits->size());
+    const std::string seal = session_seal(id_, after);
     const auto now = std::chrono::duration_cast<std::chrono::milliseconds>(
                          std::chrono::system_clock::now().time_since_epoch())
                          .count();
@@ -205,8 +284,11 @@ class Archive::Keeper : public SessionKeeper {
       if (repainted)
         access.run("INSERT OR REPLACE INTO session_marks (session, runs, seal) VALUES (?, ?, ?)", id_,
                    std::span<const std::byte>(runs), marks_seal);
-      write_painting(access, id_, RegionKind::kZero, before.zero, after.zero);
-      write_painting(access, id_, RegionKind::kOne, before.one, after.one);
+      write_painting(access, kOperations, id_, static_cast<std::int64_t>(RegionKind::kZero), before.zero,
+                     after.zero);
+      write_painting(access, kOperations, id_, static_cast<std::int64_t>(RegionKind::kOne), before.one,
+                     after.one);
+      write_regions(access, id_, before.named, after.named);
       if (before.edits != nullptr && known < before.edits->size())
         access.run("DELETE FROM edits WHERE session = ? AND number > ?", id_,
                    static_cast<std::int64_t>(known));
@@ -282,18 +364,19 @@ Outcome<std::shared_ptr<const Document>> Archive::load(const std::string& sessio
           if (document->marks == nullptr) return damaged("its painting");
         }
       }
-      auto zero = read_painting(access, session, RegionKind::kZero);
+      auto zero = read_painting(access, kOperations, session, static_cast<std::int64_t>(RegionKind::kZero));
       if (!zero.ok()) return zero.problem();
-      auto one = read_painting(access, session, RegionKind::kOne);
+      auto one = read_painting(access, kOperations, session, static_cast<std::int64_t>(RegionKind::kOne));
       if (!one.ok()) return one.problem();
+      auto named = read_regions(access, session);
+      if (!named.ok()) return named.problem();
       auto edits = read_edits(access, session);
       if (!edits.ok()) return edits.problem();
       document->zero = std::move(zero.value());
       document->one = std::move(one.value());
+      document->named = std::move(named.value());
       document->edits = std::make_shared<const EditList>(std::move(edits.value()));
-      if (seal != session_seal(session, document->revision, document->head, size_of(document->zero),
-                               size_of(document->one), document->edits->size()) ||
-          document->head > document->edits->size())
+      if (seal != session_seal(session, *document) || document->head > document->edits->size())
         return damaged("its revision");
       return std::shared_ptr<const Document>(std::move(document));
     });

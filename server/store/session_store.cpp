@@ -4,6 +4,8 @@
 #include <chrono>
 
 #include "engine/multires/normal_stencil.h"
+#include "engine/simplification/attributes.h"
+#include "engine/simplification/subsample.h"
 #include "server/base/random_id.h"
 
 namespace pointwright::server {
@@ -37,6 +39,25 @@ constexpr std::uint64_t kStateBytesPerSample = 52;
 
 constexpr std::chrono::seconds kExpiryInterval{10};
 
+/// What choosing so many of N samples takes while it lasts (engine/simplification/subsample.h).
+std::uint64_t memory_to_choose(std::uint64_t count, std::uint64_t of) {
+  constexpr std::uint64_t kBytesEach = 14;
+  constexpr std::uint64_t kBytesPerCandidate = 450;
+  constexpr std::uint64_t kCandidates = 8;
+  return of * kBytesEach + std::min(of, kCandidates * count) * kBytesPerCandidate;
+}
+
+Outcome<ChosenSamples> uniform_subsample(const Cloud& cloud, std::uint64_t count,
+                                         const ExecutionContext& context) {
+  const auto kept = subsample(cloud.position, cloud.normal, {.target = KeepCount{count}}, &context);
+  if (!kept) return protocol::to_problem(kept.error());
+  auto index = std::make_shared<std::vector<std::uint32_t>>();
+  for (const std::uint32_t i : kept.value()) index->push_back(cloud.id[i]);
+  std::sort(index->begin(), index->end());
+  return ChosenSamples{.cloud = std::make_shared<const Cloud>(chosen_cloud(cloud, kept.value())),
+                       .cloud_index = std::move(index)};
+}
+
 Problem no_such_session() {
   return {.kind = ProblemKind::kNotFound, .detail = "there is no such session"};
 }
@@ -64,36 +85,73 @@ bool SessionStore::Entry::is_idle() const {
          (session.use_count() == 1 && session->document()->state != protocol::SessionState::kBuilding);
 }
 
-SessionStore::Needs SessionStore::needs_of(const HierarchyParams& params, const Cloud& cloud) const {
-  const std::uint64_t samples = cloud.size();
+SessionStore::Needs SessionStore::needs_of(const HierarchyParams& params, std::uint64_t samples,
+                                           const Cloud& cloud) const {
   const std::uint64_t more_bands = (params.scales.size() - 1) * kBytesPerBand;
   const std::uint64_t drag = (params.scales.size() + 1) * kStencilBytes + kShapeBytes;
   const std::uint64_t graph = params.neighbors * kBytesPerNeighbor;
-  const std::uint64_t live_each = kBytesPerSample + kLiveSurfaces * more_bands + drag + graph;
-  const std::uint64_t columns = memory_of(cloud) / std::max<std::uint64_t>(samples, 1);
+  const std::uint64_t live_each =
+      kBytesPerSample + kLiveSurfaces * more_bands + drag + graph + limits_.max_named_regions;
+  const std::uint64_t columns = memory_of(cloud) / std::max<std::uint64_t>(cloud.size(), 1);
   return {.live = samples * live_each,
           .history =
               std::min(limits_.history_bytes, samples * kHistoryStates * (kStateBytesPerSample + more_bands)),
           .inserted_each = live_each + kSamplings * (kBytesInSampling + graph + columns)};
 }
 
-SessionParams SessionStore::params_of(const KeptSession& kept, std::shared_ptr<const Cloud> cloud,
-                                      const Needs& needs, const std::shared_ptr<Budget::Hold>& memory) const {
-  const std::uint64_t samples = std::max<std::uint64_t>(cloud->size(), kept.samples);
+SessionParams SessionStore::params_of(const KeptSession& kept, std::uint64_t first, const Needs& needs,
+                                      const std::shared_ptr<Budget::Hold>& memory) const {
+  const std::uint64_t samples = std::max(first, kept.samples);
   return {.id = kept.id,
           .name = kept.name,
           .owner = kept.owner,
           .cloud_id = kept.cloud,
-          .cloud = std::move(cloud),
           .hierarchy = kept.params,
           .history_bytes = needs.history,
           .max_edits = static_cast<std::size_t>(limits_.max_edits),
           .max_operations = static_cast<std::size_t>(limits_.max_operations),
           .max_painting_vertices = static_cast<std::size_t>(limits_.max_painting_vertices),
+          .max_named_regions = static_cast<std::size_t>(limits_.max_named_regions),
           .room = std::make_shared<SampleRoom>(std::max(limits_.max_session_samples, samples), memory,
                                                samples, needs.inserted_each),
           .created = kept.created,
           .keeper = archive_ == nullptr ? nullptr : archive_->keeper(kept.id)};
+}
+
+Outcome<Done> SessionStore::put_samples(SessionParams& params, const KeptSession& kept,
+                                        const SharedCloud& cloud, std::shared_ptr<const Cloud> samples,
+                                        std::uint64_t held) {
+  if (!kept.preview) {
+    params.cloud = std::move(samples);
+    return Done{};
+  }
+  struct Whole {
+    std::shared_ptr<const Cloud> samples;
+    std::shared_ptr<Budget::Hold> memory;
+  };
+  const auto whole = std::make_shared<Whole>();
+  const std::uint64_t choosing = memory_to_choose(kept.preview->count, samples->size());
+  if (choosing > held) {
+    auto memory = room_for(choosing - held);
+    if (!memory.ok()) return memory.problem();
+    whole->memory = std::move(memory.value());
+  }
+  const protocol::ModelBounds bounds{.min = cloud->document.report.bounds_min,
+                                     .max = cloud->document.report.bounds_max};
+  params.preview = {
+      .size = *kept.preview,
+      .origin = samples->origin,
+      .bounds = bounds,
+      .diagonal = bounds_of(samples->position).diagonal(),
+      .choose = [this, cloud, whole, count = kept.preview->count](const ExecutionContext& context) {
+        const std::shared_ptr<Budget::Hold> memory = std::move(whole->memory);
+        auto chosen = uniform_subsample(*whole->samples, count, context);
+        whole->samples.reset();
+        clouds_.let_go(*cloud);
+        return chosen;
+      }};
+  whole->samples = std::move(samples);
+  return Done{};
 }
 
 std::vector<SessionStore::Entry>::iterator SessionStore::entry_of(const std::string& id) {
@@ -181,7 +239,9 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const protocol::CreateSes
     const std::lock_guard lock(mutex_);
     --coming_;
   });
-  const Needs needs = needs_of(request.params, *samples.value());
+  const std::uint64_t whole = samples.value()->size();
+  const std::uint64_t first = std::min(whole, request.preview.value_or(whole));
+  const Needs needs = needs_of(request.params, first, *samples.value());
   entry.bytes = needs.live + needs.history;
   auto memory = room_for(entry.bytes);
   if (!memory.ok()) return memory.problem();
@@ -194,9 +254,13 @@ Outcome<std::shared_ptr<Session>> SessionStore::create(const protocol::CreateSes
                 .params = request.params,
                 .created = now,
                 .used = now,
-                .samples = samples.value()->size(),
+                .samples = first,
                 .damage = std::nullopt};
-  const auto session = Session::make(params_of(entry.kept, samples.value(), needs, entry.memory), services_);
+  if (first < whole) entry.kept.preview = {.count = first, .of = whole};
+  SessionParams params = params_of(entry.kept, first, needs, entry.memory);
+  if (auto put = put_samples(params, entry.kept, cloud, std::move(samples.value()), entry.bytes); !put.ok())
+    return put.problem();
+  const auto session = Session::make(std::move(params), services_);
   if (archive_ != nullptr) {
     std::optional<KeptAnswer> answer;
     if (seal) answer = seal(session);
@@ -253,15 +317,18 @@ Outcome<std::shared_ptr<Session>> SessionStore::wake(const std::string& id) {
   auto samples = clouds_.samples_of(*cloud);
   // A cloud whose file is damaged may be uploaded again: the session itself is whole.
   if (!samples.ok()) return samples.problem();
-  Needs needs = needs_of(kept.params, *samples.value());
+  const std::uint64_t first = kept.preview ? kept.preview->count : samples.value()->size();
+  Needs needs = needs_of(kept.params, first, *samples.value());
   // Those that edits inserted come back with it.
-  const std::uint64_t inserted =
-      kept.samples - std::min<std::uint64_t>(kept.samples, samples.value()->size());
+  const std::uint64_t inserted = kept.samples - std::min(kept.samples, first);
   needs.live += inserted * needs.inserted_each;
   auto memory = room_for(needs.live + needs.history);
   if (!memory.ok()) return memory.problem();
-  SessionParams params = params_of(kept, samples.value(), needs, memory.value());
+  SessionParams params = params_of(kept, first, needs, memory.value());
   params.kept = document.value();
+  if (auto put = put_samples(params, kept, cloud, std::move(samples.value()), needs.live + needs.history);
+      !put.ok())
+    return put.problem();
   const auto session = Session::make(std::move(params), services_);
   {
     const std::lock_guard lock(mutex_);
@@ -307,7 +374,8 @@ std::vector<protocol::SessionSummary> SessionStore::summaries(const MaySee& may_
          .state = kept.damage ? protocol::SessionState::kFailed : protocol::SessionState::kAsleep,
          .revision = kept.revision,
          .created = kept.created,
-         .sample_count = kept.samples});
+         .sample_count = kept.samples,
+         .preview = kept.preview});
   }
   return summaries;
 }

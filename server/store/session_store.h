@@ -76,13 +76,18 @@ class SessionStore {
     std::uint64_t history = 0;
     std::uint64_t inserted_each = 0;
   };
-  [[nodiscard]] Needs needs_of(const HierarchyParams& params, const Cloud& cloud) const;
+  /// Of so many samples that have the columns of the cloud.
+  [[nodiscard]] Needs needs_of(const HierarchyParams& params, std::uint64_t samples,
+                               const Cloud& cloud) const;
+  /// What the session begins with: the cloud's samples, or how some of them are chosen. Problems: those of
+  /// room_for(), for what choosing needs beyond `held` bytes
+  Outcome<Done> put_samples(SessionParams& params, const KeptSession& kept, const SharedCloud& cloud,
+                            std::shared_ptr<const Cloud> samples, std::uint64_t held);
   std::vector<Entry>::iterator entry_of(const std::string& id);
   Outcome<std::shared_ptr<Budget::Hold>> room_for(std::uint64_t bytes);
   void put_to_sleep(Entry& entry);
   Outcome<std::shared_ptr<Session>> wake(const std::string& id);
-  [[nodiscard]] SessionParams params_of(const KeptSession& kept, std::shared_ptr<const Cloud> cloud,
-                                        const Needs& needs,
+  [[nodiscard]] SessionParams params_of(const KeptSession& kept, std::uint64_t first, const Needs& needs,
                                         const std::shared_ptr<Budget::Hold>& memory) const;
   void mark_damaged(const std::string& id, const std::string& reason);
   void watch_expiry(const std::stop_token& stop);

@@ -120,6 +120,37 @@ TEST_CASE("a file is uploaded, painted, edited, undone and exported by the comma
   CHECK(cli.document({"cloud", "list"})["clouds"].empty());
 }
 
+TEST_CASE("a part of a cloud is edited, and regions are kept under names") {
+  Workshop shop;
+  const CommandLine& cli = shop.cli;
+  const std::string part = cli.line({"session", "create", shop.cloud, "--preview", "100", "--wait"});
+  const json document = cli.document({"session", "info", part});
+  CHECK(document["preview"] == json{{"count", 100}, {"of", 900}});
+  CHECK(cli.line({"session", "info", part}).find("samples     100 (a preview of 900)") != std::string::npos);
+  // The very samples that the command for files chooses.
+  CHECK(cli.line({"simplify", shop.sheet, shop.folder / "part.ply", "--method", "uniform", "--count", "100"})
+            .size() > 0);
+  CHECK(cli.line({"export", part, "-o", shop.folder / "session.ply"}).empty());
+  const Cloud chosen = cloud_of(text_of(shop.folder / "part.ply"));
+  const Cloud edited = cloud_of(text_of(shop.folder / "session.ply"));
+  REQUIRE(edited.size() == 100);
+  for (std::size_t i = 0; i < edited.size(); ++i) {
+    CHECK(model_position(chosen, i) == model_position(edited, i));
+    CHECK(chosen.color[i] == edited.color[i]);
+  }
+  CHECK(cli.ask({"session", "create", shop.cloud, "--preview", "0"}).status == 2);
+
+  const std::string painted = cli.line({"paint", part, "left end", "--box", "-1,-1,-1,0.2,2,1"});
+  CHECK(painted.find(" in the region") != std::string::npos);
+  const json used = cli.document({"paint", part, "one", "--region", "left end"});
+  CHECK(used["regions"]["one"]["samples"] == used["regions"]["named"][0]["samples"]);
+  CHECK(used["changed"].get<int>() > 10);
+  CHECK(cli.line({"region", "list", part}).find("left end") != std::string::npos);
+  CHECK(cli.line({"region", "delete", part, "left end"}).empty());
+  CHECK(cli.document({"region", "list", part})["regions"].size() == 2);
+  CHECK(cli.ask({"paint", part, "one", "--region", "left end"}).status == 2);
+}
+
 TEST_CASE("recipes and frames go through files and pipes") {
   Workshop shop;
   const CommandLine& cli = shop.cli;
@@ -191,7 +222,7 @@ TEST_CASE("a command's end says what went wrong") {
     for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
              {"upload"},
              {"upload", shop.folder / "none.ply"},
-             {"paint", session, "two", "--all"},
+             {"paint", session, "t", "--all"},
              {"paint", session, "one"},
              {"paint", session, "one", "--all", "--clear"},
              {"paint", session, "one", "--sphere", "1,2,3"},

@@ -66,6 +66,41 @@ double widest_gap(const Cloud& cloud) {
 
 }  // namespace
 
+TEST_CASE("downloads say along which direction the surface is stretched") {
+  Daemon daemon;
+  const std::string cloud = daemon.upload(file_of(wavy_sheet(40)), "application/x-ply").json()["id"];
+  const std::string session = painted_session(daemon, cloud);
+  const auto columns = [&](const std::string& format) {
+    const std::string query = "&attributes=stretch,stretch_x,stretch_y,stretch_z";
+    const Reply reply = daemon.get(session + "/samples?format=" + format + query);
+    REQUIRE_MESSAGE(reply.status == 200, reply.body);
+    return reply.body;
+  };
+  const auto each = [](const std::string& file, auto visit) {
+    const Cloud measured_cloud = cloud_of(file);
+    REQUIRE(measured_cloud.scalars.size() == 4);
+    const auto value = [&](std::size_t k, std::size_t i) {
+      return double{std::get<std::vector<float>>(measured_cloud.scalars[k].values)[i]};
+    };
+    for (std::size_t i = 0; i < measured_cloud.size(); ++i)
+      visit(value(0, i), Vec3d(value(1, i), value(2, i), value(3, i)));
+  };
+  each(columns("ply"), [](double, const Vec3d& direction) { CHECK(direction == Vec3d::Zero()); });
+  // Too coarse a spacing to insert anything: the cells stay as the pull along x leaves them.
+  const json record = recorded(daemon, session, pull(2.0, R"({"bound":1.5,"min_spacing":10})"));
+  CHECK(record["inserted"] == 0);
+  std::size_t pulled = 0;
+  each(columns("ply"), [&](double stretch, const Vec3d& direction) {
+    if (stretch < 2.0) return;
+    ++pulled;
+    CHECK(direction.norm() == doctest::Approx(1.0).epsilon(1e-5));
+    CHECK(direction.x() > 0.85);
+  });
+  CHECK(pulled > 300);
+  for (const char* format : {"draco", "las"}) CHECK_FALSE(columns(format).empty());
+  CHECK(daemon.get(session + "/samples?format=ply&attributes=stretch_w").status == 422);
+}
+
 TEST_CASE("a stretched sheet gets samples, and undo, redo and a recipe give the same bytes") {
   const std::string file = file_of(wavy_sheet(40));
   std::string recipe;

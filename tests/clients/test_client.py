@@ -17,7 +17,7 @@ import support
 from pointwright import (
     ANY, BadFrame, Client, Conflict, Frame, Invalid, NotFound, NotSupported, StaleRevision, Surface, TooLarge,
     Unreachable, UnsupportedFormat, add, along_normal, assign, box, clear, ellipse, everything, flood, grow, half_space,
-    image, intersect, invert, model, planar, points, polygon, polyline, remove, resampling, rotation, scale, screen,
+    image, intersect, invert, model, planar, points, polygon, polyline, region, remove, resampling, rotation, scale, screen,
     sequence, shrink, sphere, stroke, texture, toward_point, translation, twist,
 )  # fmt: skip
 
@@ -74,6 +74,31 @@ class AgainstTheDaemon(unittest.TestCase):
                 self.assertEqual(new, exact)
             elif old[0] >= 0.8:
                 self.assertAlmostEqual(new[2], old[2] + 0.4, places=2)
+
+    def test_a_session_edits_a_part_of_its_cloud(self):
+        part = self.cloud.open_session(scales=[0.05], preview=200)
+        self.addCleanup(part.delete)
+        self.assertEqual(part.document["preview"], {"count": 200, "of": SIDE * SIDE})
+        self.assertEqual(part.document["sample_count"], 200)
+        self.assertNotIn("preview", self.session.document)
+        with self.assertRaises(Invalid) as caught:
+            self.cloud.open_session(preview=0)
+        self.assertEqual(caught.exception.errors[0]["pointer"], "/preview/count")
+
+    def test_regions_are_kept_under_names_and_used_again(self):
+        session = self.painted()
+        samples = session.painting("one")["samples"]
+        session.save_region("right end", "one")
+        self.assertEqual(session.painting("right end")["samples"], samples)
+        session.clear_region("one")
+        self.assertEqual(session.paint("one", region("right end")), samples)
+        names = [each["region"] for each in session.regions()]
+        self.assertEqual(names, ["zero", "one", "right end"])
+        session.clear_region("right end")
+        with self.assertRaises(NotFound):
+            session.painting("right end")
+        with self.assertRaises(Invalid):
+            session.paint("one", region("right end"))
 
     def test_history_goes_back_and_forth_and_stale_edits_are_refused(self):
         session = self.painted()

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "tests/editing/editing_support.h"
@@ -51,6 +52,31 @@ TEST_CASE("the modes add, remove, intersect and set") {
   CHECK(row.marks == Marks{0, 0, 1, 1});
   CHECK(count_marked(row.marks, RegionKind::kZero) == 2);
   CHECK(count_marked(row.marks, RegionKind::kOne) == 0);
+}
+
+TEST_CASE("a region's samples are painted by their places among the samples, through every mode and filter") {
+  Row row;
+  PaintOperation use{.shape =
+                         RegionShape{.source = "wing",
+                                     .members = std::make_shared<const SampleMask>(SampleMask{0, 1, 0, 1})}};
+  CHECK(validate(use).ok());
+  CHECK(depends_on_sampling(use));
+  CHECK(has_its_data(use.shape));
+  CHECK_FALSE(has_its_data(RegionShape{.source = "wing", .members = nullptr}));
+  CHECK(row.apply(use) == 2);
+  CHECK(row.marks == Marks{0, 1, 0, 1});
+  use.mode = PaintMode::kRemove;
+  use.facing = Vec3d::UnitZ();
+  CHECK(row.apply(use) == 1);  // the last sample faces away
+  CHECK(row.marks == Marks{0, 0, 0, 1});
+  use.facing.reset();
+  use.mode = PaintMode::kSet;
+  CHECK(row.apply(use, RegionKind::kOne) == 2);
+  CHECK(row.marks == Marks{0, kOneBit, 0, kZeroBit | kOneBit});
+  row.apply(from_x(0.5, PaintMode::kAdd));
+  use.mode = PaintMode::kIntersect;
+  CHECK(row.apply(use) == 1);
+  CHECK(row.marks == Marks{0, kZeroBit | kOneBit, 0, kZeroBit | kOneBit});
 }
 
 TEST_CASE("a facing brush does not paint samples that look away") {

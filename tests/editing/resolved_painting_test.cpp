@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -51,11 +52,17 @@ std::vector<PaintOperation> dependent_operations(const Scan& scan) {
   const Vec3d up = Vec3d::UnitZ();
   ScreenShape seen = from_above(scan, 0.45);
   seen.visible = true;
+  SampleMask kept(scan.surface.size(), 0);
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    kept[i] = scan.surface.position[i].y() > 0.1F && i % 7 != 0 ? 1 : 0;
+  const RegionShape region{.source = "kept", .members = std::make_shared<const SampleMask>(kept)};
   std::vector<PaintOperation> operations;
   for (const PaintMode mode : {PaintMode::kAdd, PaintMode::kRemove, PaintMode::kIntersect, PaintMode::kSet}) {
     operations.push_back({.mode = mode, .shape = ball, .facing = up});
     operations.push_back({.mode = mode, .shape = Everything{}, .facing = up});
     operations.push_back({.mode = mode, .shape = seen});
+    operations.push_back({.mode = mode, .shape = region});
+    operations.push_back({.mode = mode, .shape = region, .facing = up});
     // Covers nothing.
     operations.push_back(
         {.mode = mode, .shape = Sphere{.center = scan.at(9.0, 0.0, 0.0), .radius = 1.0}, .facing = up});

@@ -116,7 +116,7 @@ TEST_CASE("the examples of requests pass their parsers and come back the same") 
   for (const char* name :
        {"operation-sphere", "operation-stroke", "operation-box", "operation-half-space", "operation-all",
         "operation-points", "operation-invert", "operation-grow", "operation-screen", "operation-visible",
-        "operation-flood", "operation-image", "operation-texture", "operation-model"}) {
+        "operation-flood", "operation-image", "operation-texture", "operation-model", "operation-region"}) {
     CAPTURE(name);
     const Json example = document(name);
     const auto operation = parse_paint_operation(example);

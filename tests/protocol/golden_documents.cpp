@@ -56,6 +56,15 @@ UploadDocument upload() {
           .expires = created() + std::chrono::hours(24)};
 }
 
+ImportDocument import() {
+  return {.id = "p7k8l9m0n1o2p-q_r3s4t5",
+          .name = "The yard",
+          .bytes = upload().length,
+          .created = created(),
+          .state = ImportState::kRunning,
+          .progress = {.phase = "ordering", .fraction = 0.6}};
+}
+
 ImageDocument image() {
   return {.id = "i7k8l9m0n1o2p-q_r3s4t5",
           .width = 1024,
@@ -97,9 +106,17 @@ SessionDocument ready() {
                             .rms_detail = 0.00075F}};
   session.zero = {.samples = 120000, .operations = 2};
   session.one = {.samples = 9500, .operations = 1};
+  session.named = {{.name = "left wing", .region = {.samples = 31000, .operations = 3}}};
   session.head = 1;
   session.edits = 2;
   session.timings_ms = {{"normals", 61.5}, {"smoothing", 340.0}, {"decomposition", 205.25}};
+  return session;
+}
+
+SessionDocument preview() {
+  SessionDocument session = building();
+  session.summary.sample_count = 100'000;
+  session.summary.preview = PreviewSize{.count = 100'000, .of = 437'645};
   return session;
 }
 
@@ -253,15 +270,18 @@ std::vector<File> document_files() {
       {"cloud-list", cloud_list({cloud()})},
       {"upload", to_json(upload())},
       {"upload-list", upload_list({upload()})},
+      {"import", to_json(import())},
+      {"import-list", import_list({import()})},
       {"import-cloud",
        JsonDocument{{"upload", upload().id}, {"name", "The yard"}, {"nonfinite", "drop"}, {"format", "las"}}},
       {"image", to_json(image())},
       {"image-list", image_list({image()})},
-      {"session-building", to_json(building())},
+      {"session-building", to_json(preview())},
       {"session", to_json(ready())},
       {"session-failed", to_json(failed())},
       {"session-list", session_list({building().summary, ready().summary})},
-      {"painting", painting_document(RegionKind::kZero, 120000, shared_operations())},
+      {"region-list", region_list(ready())},
+      {"painting", painting_document("zero", 120000, shared_operations())},
       {"edit-list", edit_list(1, edits())},
       {"edit-along-normal", edit_of(NormalOffset{.distance = -0.004}, Blend::kCubic, {1.5F})},
       {"edit-resampling", to_json(resampling_edit())},

@@ -415,6 +415,15 @@ TEST_CASE("a session names its cloud; the rest has defaults") {
   CHECK(full.name == "Wings");
   CHECK(full.params.scales == std::vector<float>{0.05F});
   CHECK(full.params.neighbors == 12);
+  CHECK_FALSE(plain.preview.has_value());
+  CHECK(accepted(cloud + R"(,"preview":{"count":5000}})", parse_create_session).preview == 5000U);
+  CHECK(accepted(cloud + R"(,"preview":{"count":4294967295}})", parse_create_session).preview == 4294967295U);
+  for (const char* count : {"0", "-1", "1.5", "4294967296", "\"5\"", "null"})
+    CHECK(refused(cloud + R"(,"preview":{"count":)" + count + "}}", parse_create_session) ==
+          Pointers{"/preview/count"});
+  CHECK(refused(cloud + R"(,"preview":{}})", parse_create_session) == Pointers{"/preview/count"});
+  CHECK(refused(cloud + R"(,"preview":{"count":5,"of":9}})", parse_create_session) ==
+        Pointers{"/preview/of"});
 
   CHECK(refused(R"({"cloud":"short"})", parse_create_session) == Pointers{"/cloud"});
   CHECK(refused(R"({"cloud":7})", parse_create_session) == Pointers{"/cloud"});

@@ -169,5 +169,34 @@ TEST_CASE("nothing of a tangled model is lost: any order of edits stays sound") 
   CHECK(scene.sampling->size() > 100);
 }
 
+TEST_CASE(
+    "the direction of the larger stretch is that of the cells' longest diameter, whatever their sides") {
+  const Vec3f along = Vec3f(2.0F, -1.0F, 2.0F) / 3.0F;
+  const Vec3f across = Vec3f(1.0F, 2.0F, 0.0F) / std::sqrt(5.0F);
+  constexpr std::size_t kTurns = 16;
+  Sampling sampling;
+  sampling.spacing.assign(kTurns + 2, 1.0F);
+  CHECK(stretch_directions(sampling)[0] == Vec3f::Zero());  // no cells: unit squares
+  sampling.cell_u = Points(kTurns + 2);
+  sampling.cell_v = Points(kTurns + 2);
+  // The sides of one and the same stretched square, however it was turned before: J u, J v.
+  for (std::size_t i = 0; i < kTurns; ++i) {
+    const float angle = 0.4F * static_cast<float>(i);
+    const float c = std::cos(angle);
+    const float s = std::sin(angle);
+    sampling.cell_u.set(i, 3.0F * c * along + 0.5F * s * across);
+    sampling.cell_v.set(i, -3.0F * s * along + 0.5F * c * across);
+  }
+  // Round but for less than a thousandth; collapsed.
+  sampling.cell_u.set(kTurns, 2.0F * along);
+  sampling.cell_v.set(kTurns, 1.9995F * across);
+  sampling.cell_u.set(kTurns + 1, Vec3f::Zero());
+  sampling.cell_v.set(kTurns + 1, Vec3f::Zero());
+  const Points directions = stretch_directions(sampling);
+  for (std::size_t i = 0; i < kTurns; ++i) CHECK((directions[i] - along).norm() < 1e-5F);
+  CHECK(directions[kTurns] == Vec3f::Zero());
+  CHECK(directions[kTurns + 1] == Vec3f::Zero());
+}
+
 }  // namespace
 }  // namespace pointwright

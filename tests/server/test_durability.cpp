@@ -163,6 +163,40 @@ TEST_CASE("a cloud that a sleeping session uses stays; a session that is deleted
   CHECK(service.get("/v1/sessions").body["sessions"].empty());
 }
 
+TEST_CASE(
+    "a session on a part of its cloud lets the rest of it go, and takes it again where it is asked for") {
+  const TemporaryFolder folder;
+  std::string path;
+  std::string bytes;
+  const auto ready = [&](TestService& service) {
+    for (int i = 0; i < 5000 && service.get(path).body["state"] != "ready"; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    REQUIRE(service.get(path).body["state"] == "ready");
+  };
+  {
+    TestService service(lasting(folder));
+    const std::string cloud = service.upload(60);
+    CHECK(service.service.clouds.memory().held() > 0);
+    const Answer made =
+        service.ask(Method::kPost, "/v1/sessions", R"({"cloud":")" + cloud + R"(","preview":{"count":500}})");
+    REQUIRE(made.status == 202);
+    path = made.header("Location");
+    ready(service);
+    CHECK(service.service.clouds.memory().held() == 0);
+    const std::uint64_t part = service.service.sessions.memory().held();
+    // What is asked for of the whole cloud is read again.
+    CHECK(service.get("/v1/clouds/" + cloud + "/data?format=ply").status == 200);
+    CHECK(service.service.clouds.memory().held() > 0);
+    REQUIRE(service.ask(Method::kPost, "/v1/sessions", R"({"cloud":")" + cloud + R"("})").status == 202);
+    CHECK(service.service.sessions.memory().held() > 5 * part);
+    bytes = samples(service, path);
+  }
+  TestService service(lasting(folder));
+  CHECK(service.get(path).status == 200);
+  ready(service);
+  CHECK(samples(service, path) == bytes);
+}
+
 TEST_CASE("a file that is damaged takes its session alone with it, until it is uploaded again") {
   const TemporaryFolder folder;
   const Config config = lasting(folder);

@@ -44,13 +44,14 @@ struct Answer {
 /// A service whose decoder runs in this process.
 struct TestService {
   explicit TestService(Config config = {}, Resampler resample = double_every_tenth)
-      : service(std::move(config),
-                {.decode = [](std::span<const std::byte> bytes, CloudFormat format,
-                              const ImportParams& params) { return decode_cloud(bytes, format, params); },
-                 .decode_image = [](std::span<const std::byte> bytes) { return read_png(bytes, {}); },
-                 .build = build_hierarchy,
-                 .resample = std::move(resample),
-                 .assets = {}}) {
+      : service(
+            std::move(config),
+            {.decode = [](std::span<const std::byte> bytes, CloudFormat format, const ImportParams& params,
+                          const ExecutionContext*) { return decode_cloud(bytes, format, params); },
+             .decode_image = [](std::span<const std::byte> bytes) { return read_png(bytes, {}); },
+             .build = build_hierarchy,
+             .resample = std::move(resample),
+             .assets = {}}) {
     notes = service.recover();
   }
 

@@ -43,7 +43,7 @@ test("what opens a session stays within 200 kB of scripts, compressed; rarely us
   visit(editor[0]);
   const bytes = [...first].reduce((sum, name) => sum + gzipSync(entries.get(name), { level: 9 }).length, 0);
   assert.ok(bytes <= scriptBudget, `${bytes} bytes`);
-  for (const part of ["home-", "image-form-", "model-form-", "shortcut-sheet-"]) {
+  for (const part of ["home-", "image-form-", "model-form-", "saved-regions-", "shortcut-sheet-"]) {
     const [name] = [...later].filter((each) => each.startsWith(part));
     assert.ok(name && !first.has(name), `${part}*.js is asked for when it is wanted`);
   }

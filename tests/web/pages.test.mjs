@@ -88,6 +88,25 @@ test("clouds and sessions are deleted at the second press only", { timeout }, as
   await page.close();
 });
 
+test("a session is begun on as many samples as the field says", { timeout }, async () => {
+  const whole = await createSession(service, 4000);
+  const { page, troubles } = await open(`${service.url}/`);
+  const card = page.locator(`[data-cloud="${whole.cloud}"]`);
+  const field = card.getByLabel("Samples");
+  assert.equal(await field.inputValue(), "4,000");
+  await field.fill("none");
+  await card.getByRole("button", { name: "New session" }).click();
+  await card.getByText("a whole number").waitFor();
+  await field.fill("1,500");
+  await card.getByRole("button", { name: "New session" }).click();
+  await page.waitForURL(/session=/, { timeout: waitMs });
+  await waitForIdle(page, waitMs);
+  assert.equal((await page.evaluate(() => globalThis.pointwright.status)).loadedSamples, 1500);
+  assert.match(await page.locator('[data-status="samples"]').textContent(), /1,500 samples, a preview of 4,000/);
+  await checkTroubles(page, troubles);
+  await page.close();
+});
+
 test("an automatic audit finds nothing serious on the pages", { timeout }, async () => {
   const session = await createSession(service, 3000);
   const home = await open(`${service.url}/`);
@@ -99,8 +118,9 @@ test("an automatic audit finds nothing serious on the pages", { timeout }, async
   assert.deepEqual(await seriousFindings(editor.page), []);
   await editor.page.keyboard.press("o");
   await editor.page.keyboard.press("w");
-  for (const name of ["Shape by numbers", "Regions from an image", "Regions from another model"])
+  for (const name of ["Saved regions", "Shape by numbers", "Regions from an image", "Regions from another model"])
     await editor.page.locator("summary", { hasText: name }).click();
+  await editor.page.getByText("Save region", { exact: true }).waitFor();
   await editor.page.getByText("Choose a PNG").waitFor();
   await editor.page.getByText("Apply model").waitFor();
   await editor.page.locator('[data-region="one"] [aria-controls]').click();

@@ -7,9 +7,11 @@ import {
   countPixels,
   drag,
   fill,
+  json,
   openEditor,
   paintCaps,
   project,
+  service,
   startAroundTests,
   timeout,
   until,
@@ -253,5 +255,45 @@ test("toward a point that is clicked, and a composition of steps", { timeout }, 
     target: [0, 0, 0],
     amount: 0.25,
   });
+  await close();
+});
+
+test("a region is saved under a name, cleared, and joins again from the list", { timeout }, async () => {
+  const { page, state, close } = await openSmall();
+  const session = (await state()).id;
+  const put = (region, operations) =>
+    json(`${service.url}/v1/sessions/${session}/regions/${region}`, {
+      method: "PUT",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify({ operations }),
+    });
+  await put("one", [{ mode: "add", shape: { type: "half_space", point: [0.5, 0, 0], normal: [1, 0, 0] } }]);
+  await waitForRevision(page, (await state()).revision);
+  const { samples: count } = (await state()).regions.one;
+  assert.ok(count > 100);
+
+  await page.locator("summary", { hasText: "Saved regions" }).click();
+  const form = page.locator('form[data-form="save-region"]');
+  await form.getByLabel("Save as").fill("t");
+  await form.getByRole("button", { name: "Save region" }).click();
+  await page.getByText("means something else here").waitFor();
+  await form.getByLabel("Save as").fill("right end");
+  const saved = await change(page, state, () => form.getByRole("button", { name: "Save region" }).click());
+  assert.deepEqual(saved.named, [{ region: "right end", samples: count, operations: 1 }]);
+  const row = page.locator('[data-saved="right end"]');
+  assert.match(await row.textContent(), new RegExp(count.toLocaleString("en")));
+
+  await change(page, state, () => page.getByLabel("Clear the one-region").click());
+  const { zero } = await change(page, state, () =>
+    row.getByRole("button", { name: "Add right end to the zero-region" }).click(),
+  );
+  assert.equal(zero.samples, count);
+  // What was painted with it can be undone; the saved one stays until it is deleted.
+  await canvas(page).focus();
+  const undone = await change(page, state, () => page.keyboard.press("Control+z"));
+  assert.equal(undone.zero.samples, 0);
+  assert.equal(undone.named.length, 1);
+  await change(page, state, () => page.getByLabel("Delete the saved region right end").click());
+  await page.getByText("None yet.").waitFor();
   await close();
 });

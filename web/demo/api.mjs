@@ -1,13 +1,14 @@
-// What the demonstration and the figures ask of a daemon, and the pictures that they take with the real viewer.
+// What the demonstration and the figures share: the typed client, and the pictures that they take with the real viewer.
 import { spawn } from "node:child_process";
 import { dirname, relative, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
+import { waitForSession } from "../../clients/typescript/dist/pointwright.js";
+
+export { ApiClient, decodeFrame, uploadBytes } from "../../clients/typescript/dist/pointwright.js";
 
 export const root = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
 /** A path as the user would type it. */
 export const here = (path) => relative(process.cwd(), path);
-
-const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
 export function demand(condition, reason) {
   if (!condition) throw new Error(reason);
@@ -26,40 +27,15 @@ export async function step(label, work) {
   return result;
 }
 
-/** A request to the API; anything but success is an error with the problem document's own words. */
-export async function call(url, method, path, { json, body, headers = {} } = {}) {
-  const response = await fetch(url + path, {
-    method,
-    headers: { ...(json ? { "Content-Type": "application/json" } : {}), ...headers },
-    body: json ? JSON.stringify(json) : body,
-  });
-  if (!response.ok) {
-    const text = await response.text();
-    throw new Error(`${method} ${path} answered ${response.status}: ${text.slice(0, 2000)}`);
-  }
-  return response;
+/** A session of the cloud, ready. */
+export async function openSession(client, cloud, options) {
+  const { id } = await client.createSession(cloud.id, options);
+  return waitForSession(client, id);
 }
 
-/** Uploads a cloud; answers its document. */
-export async function upload(url, name, type, body) {
-  const headers = { "Content-Type": type };
-  return (await call(url, "POST", `/v1/clouds?name=${encodeURIComponent(name)}`, { body, headers })).json();
-}
-
-/** Makes a session and waits until it is ready; answers its document with its `path`. */
-export async function openSession(url, params) {
-  const response = await call(url, "POST", "/v1/sessions", { json: params });
-  const path = response.headers.get("location");
-  demand(response.status === 202 && path, "POST /v1/sessions did not answer 202 with a Location");
-  for (;;) {
-    const document = await (await call(url, "GET", path)).json();
-    if (document.state === "ready") return { path, ...document };
-    demand(
-      document.state === "building",
-      `the session failed: ${JSON.stringify(document.error ?? document)}`,
-    );
-    await sleep(20);
-  }
+/** A file that the service gives, as bytes. */
+export async function download(client, path) {
+  return Buffer.from(await (await client.request(path)).arrayBuffer());
 }
 
 /** A picture of the session as the viewer shows it; answers where it is. */

@@ -2,7 +2,19 @@
 // asked for, and takes pictures with the real viewer. `make demo` builds what it needs and runs it.
 import { mkdirSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { resolve } from "node:path";
-import { call, demand, here, openSession, root, say, step, takePicture, upload } from "./api.mjs";
+import {
+  ApiClient,
+  decodeFrame,
+  demand,
+  download,
+  here,
+  openSession,
+  root,
+  say,
+  step,
+  takePicture,
+  uploadBytes,
+} from "./api.mjs";
 import { putTogether } from "./beside.mjs";
 import { startDaemon } from "./daemon.mjs";
 import { oneOperations, regionOf, turn, zeroOperations } from "./dragon.mjs";
@@ -19,17 +31,19 @@ const megabytes = (bytes) => `${(bytes / 1e6).toFixed(1)} MB`;
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
 
 /** One preview as a tool asks for it: the parameters go, the exact frame comes back. Answers its milliseconds and bytes. */
-async function preview(url, session, sequence, revision) {
+async function preview(client, id, sequence, revision) {
   const start = performance.now();
-  const edit = { ...turn((angleDeg * sequence) / previewCount), sequence };
-  const response = await call(url, "POST", `${session}/preview?attributes=normal,t`, { json: edit });
-  const frame = Buffer.from(await response.arrayBuffer());
+  const response = await client.request(`v1/sessions/${id}/preview?attributes=normal,t`, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ ...turn((angleDeg * sequence) / previewCount), sequence }),
+  });
+  const bytes = new Uint8Array(await response.arrayBuffer());
   const ms = performance.now() - start;
-  demand(frame.subarray(0, 4).toString("latin1") === "PWFR", "the preview is not a frame");
-  demand(frame.readUInt32LE(8) === frame.length, "the frame's length is not what its header says");
-  demand(Number(frame.readBigUInt64LE(16)) === revision, "the frame shows another revision");
-  demand(Number(frame.readBigUInt64LE(24)) === sequence, "the frame shows another preview");
-  return { ms, bytes: frame.length };
+  const { header } = decodeFrame(bytes);
+  demand(header.revision === revision, "the frame shows another revision");
+  demand(header.sequence === sequence, "the frame shows another preview");
+  return { ms, bytes: bytes.length };
 }
 
 /** Compares the download with the upload. Answers what to say; throws where the edit is not the one that was asked for. */
@@ -76,13 +90,14 @@ function verify(before, after, diagonal) {
 }
 
 async function tell(url) {
+  const client = new ApiClient(url);
   const drc = readFileSync(dragon);
   const cloud = await step("upload the scan", async () => {
-    const document = await upload(url, "Stanford dragon", "model/x-draco", drc);
+    const document = await uploadBytes(client, "Stanford dragon", drc);
     return [`${document.sample_count} samples, ${megabytes(drc.length)} of Draco`, document];
   });
   const session = await step("split shape and detail", async () => {
-    const document = await openSession(url, { cloud: cloud.id, name: "Demo", scales: [0.02, 0.01, 0.005] });
+    const document = await openSession(client, cloud, { name: "Demo", scales: [0.02, 0.01, 0.005] });
     const share = (band) => `${((100 * band.max_detail) / document.diagonal).toFixed(2)} %`;
     return [
       `${document.decomposition.length} bands, details up to ${document.decomposition.map(share).join(", ")} of the diagonal`,
@@ -92,19 +107,14 @@ async function tell(url) {
   const picture = (name, mode) => takePicture(url, session.id, resolve(out, name), { camera, mode });
   await step("picture: before", () => picture("before.png", "shaded"));
 
+  const { id } = session;
   await step("paint what stays", async () => {
-    const response = await call(url, "PUT", `${session.path}/regions/zero`, {
-      json: { operations: zeroOperations },
-    });
-    return `${(await response.json()).regions.zero.samples} samples`;
+    const { regions } = await client.putOperations(id, "zero", zeroOperations);
+    return `${regions.zero.samples} samples`;
   });
   const revision = await step("paint what moves", async () => {
     let document;
-    for (const operation of oneOperations) {
-      document = await (
-        await call(url, "POST", `${session.path}/regions/one/operations`, { json: operation })
-      ).json();
-    }
+    for (const operation of oneOperations) document = await client.addOperation(id, "one", operation);
     return [`${document.regions.one.samples} samples`, document.revision];
   });
   await step("picture: painted", () => picture("painted.png", "regions"));
@@ -112,29 +122,23 @@ async function tell(url) {
   await step("drag the head", async () => {
     const frames = [];
     for (let sequence = 1; sequence <= previewCount; sequence++)
-      frames.push(await preview(url, session.path, sequence, revision));
-    await call(url, "DELETE", `${session.path}/preview`);
+      frames.push(await preview(client, id, sequence, revision));
+    await client.endPreview(id);
     const times = frames.map(({ ms }) => ms);
     return `${previewCount} frames, ${median(times).toFixed(1)} ms each (${Math.max(...times).toFixed(1)} at most), ${megabytes(frames[0].bytes)}`;
   });
   await step("commit the edit", async () => {
-    const json = turn(angleDeg);
-    const response = await call(url, "POST", `${session.path}/edits`, {
-      json,
-      headers: { "If-Match": `"r${revision}"` },
-    });
-    const record = await response.json();
-    return `${record.moved_samples} samples moved, now at revision ${response.headers.get("etag")}`;
+    const record = await client.commitEdit(id, turn(angleDeg), revision);
+    return `${record.moved_samples} samples moved, now at revision ${(await client.session(id)).revision}`;
   });
-  const download = async (path) => Buffer.from(await (await call(url, "GET", path)).arrayBuffer());
   const edited = await step("download the result", async () => {
-    const bytes = await download(`${session.path}/samples?format=ply`);
+    const bytes = await download(client, `v1/sessions/${id}/samples?format=ply`);
     const file = resolve(out, "dragon-edited.ply");
     writeFileSync(file, bytes);
     return [`${here(file)}, ${megabytes(statSync(file).size)}`, bytes];
   });
   await step("check it", async () => {
-    const original = await download(`/v1/clouds/${cloud.id}/data?format=ply`);
+    const original = await download(client, `v1/clouds/${cloud.id}/data?format=ply`);
     return verify(readPly(original), readPly(edited), cloud.diagonal);
   });
   await step("picture: after", () => picture("after.png", "shaded"));

@@ -3,7 +3,7 @@
 import { mkdirSync, rmSync } from "node:fs";
 import { resolve } from "node:path";
 import { launchBrowser } from "../scripts/browser.mjs";
-import { call, here, openSession, root, step, takePicture, upload } from "./api.mjs";
+import { ApiClient, download, here, openSession, root, step, takePicture, uploadBytes } from "./api.mjs";
 import { averaged } from "./averaged.mjs";
 import { putTogether } from "./beside.mjs";
 import { startDaemon } from "./daemon.mjs";
@@ -11,17 +11,16 @@ import { checkerboard, plate } from "./plate.mjs";
 
 const out = resolve(root, "build/figures");
 const side = 352;
-const ply = "application/x-ply";
 const size = "1000x800";
 const aspect = 1000 / 800;
 
-const put = (url, session, region, operations) =>
-  call(url, "PUT", `${session.path}/regions/${region}`, { json: { operations } });
-async function commit(url, session, json) {
-  const { revision } = await (await call(url, "GET", session.path)).json();
-  return call(url, "POST", `${session.path}/edits`, { json, headers: { "If-Match": `"r${revision}"` } });
+const put = (client, { id }, region, operations) => client.putOperations(id, region, operations);
+async function commit(client, { id }, edit) {
+  return client.commitEdit(id, edit, (await client.session(id)).revision);
 }
-const undoAll = (url, session) => call(url, "PUT", `${session.path}/head`, { json: { edit: 0 } });
+async function goTo(client, { id }, edit) {
+  return client.putHead(id, edit, (await client.session(id)).revision);
+}
 
 const add = (shape) => ({ mode: "add", shape });
 const beyondCircle = [add({ type: "sphere", center: [0, 0, 0], radius: 0.85 }), { mode: "invert" }];
@@ -56,21 +55,22 @@ const examples = [
 ];
 
 async function elementaryDeformations(url) {
+  const client = new ApiClient(url);
   const camera = { position: [0.5, -2.5, 1.9], target: [0, -0.05, 0.1], up: [0, 0, 1] };
-  const cloud = await upload(url, "Plate", ply, plate(side, { colour: checkerboard(16) }));
-  const session = await openSession(url, { cloud: cloud.id, name: "Figure 5", scales: [0.01] });
+  const cloud = await uploadBytes(client, "Plate", plate(side, { colour: checkerboard(16) }));
+  const session = await openSession(client, cloud, { name: "Figure 5", scales: [0.01] });
   const rows = [];
   for (const { name, zero, one, deformation } of examples) {
-    await put(url, session, "zero", zero);
-    await put(url, session, "one", one);
+    await put(client, session, "zero", zero);
+    await put(client, session, "one", one);
     const file = (mode) => resolve(out, `${name}-${mode}.png`);
     const picture = (mode) => takePicture(url, session.id, file(mode), { camera, mode, size });
     await picture("regions");
     await picture("t");
-    await commit(url, session, { level: 0, deformation });
-    for (const region of ["zero", "one"]) await put(url, session, region, []); // their tint would hide the colours
+    await commit(client, session, { level: 0, deformation });
+    for (const region of ["zero", "one"]) await put(client, session, region, []); // their tint would hide the colours
     await picture("color");
-    await undoAll(url, session);
+    await goTo(client, session, 0);
     rows.push(["regions", "t", "color"].map(file));
   }
   const figure = resolve(out, "figure-5.jpg");
@@ -80,32 +80,33 @@ async function elementaryDeformations(url) {
 
 /** Pulls the middle of a checkered plane up: holes without resampling; with it, crisp, and blurred as the paper's caption says. */
 async function pulledPlane(url) {
+  const client = new ApiClient(url);
   const samples = 100 * 100;
-  const cloud = await upload(url, "Plane", ply, plate(100, { colour: checkerboard(16) }));
-  const session = await openSession(url, { cloud: cloud.id, name: "Figure 7", scales: [0.02] });
+  const cloud = await uploadBytes(client, "Plane", plate(100, { colour: checkerboard(16) }));
+  const session = await openSession(client, cloud, { name: "Figure 7", scales: [0.02] });
   const circle = (radius) => add({ type: "sphere", center: [0, 0, 0], radius });
-  await put(url, session, "zero", [circle(0.9), { mode: "invert" }]);
-  await put(url, session, "one", [circle(0.1)]);
+  await put(client, session, "zero", [circle(0.9), { mode: "invert" }]);
+  await put(client, session, "one", [circle(0.1)]);
   const camera = { position: [1.1, -4.5, 2.7], target: [0, 0, 0.82], up: [0, 0, 1] };
   const file = (name) => resolve(out, `${name}.png`);
   const picture = (id, name) => takePicture(url, id, file(name), { camera, mode: "color", size });
   const clear = async () => {
-    for (const region of ["zero", "one"]) await put(url, session, region, []); // their tint would hide the colours
+    for (const region of ["zero", "one"]) await put(client, session, region, []); // their tint would hide the colours
   };
   const pull = { level: 0, deformation: { type: "translation", vector: [0, 0, 1.9] } };
-  await commit(url, session, pull);
+  await commit(client, session, pull);
   await clear();
   await picture(session.id, "stretched");
-  await undoAll(url, session);
-  await put(url, session, "zero", [circle(0.9), { mode: "invert" }]);
-  await put(url, session, "one", [circle(0.1)]);
-  await commit(url, session, { ...pull, resampling: {} });
+  await goTo(client, session, 0);
+  await put(client, session, "zero", [circle(0.9), { mode: "invert" }]);
+  await put(client, session, "one", [circle(0.1)]);
+  await commit(client, session, { ...pull, resampling: {} });
   await clear();
   await picture(session.id, "resampled");
-  const exported = await call(url, "GET", `${session.path}/samples?format=ply`);
-  const blurred = averaged(new Uint8Array(await exported.arrayBuffer()), samples, 10);
-  const other = await upload(url, "Averaged", ply, blurred);
-  const shown = await openSession(url, { cloud: other.id, name: "Figure 7, averaged", scales: [0.02] });
+  const exported = await download(client, `v1/sessions/${session.id}/samples?format=ply`);
+  const blurred = averaged(exported, samples, 10);
+  const other = await uploadBytes(client, "Averaged", blurred);
+  const shown = await openSession(client, other, { name: "Figure 7, averaged", scales: [0.02] });
   await picture(shown.id, "averaged");
   const figure = resolve(out, "figure-7.jpg");
   await putTogether([["stretched", "resampled", "averaged"].map(file)], aspect, figure);
@@ -129,10 +130,10 @@ async function lettering() {
 
 /** Bright pixels move up, dark ones stay: the letters are embossed by a translation. Then the plate is lifted at one side. */
 async function embossedPlate(url) {
-  const cloud = await upload(url, "Embossed plate", ply, plate(side));
-  const session = await openSession(url, { cloud: cloud.id, name: "Figure 10", scales: [0.06] });
-  const headers = { "Content-Type": "image/png" };
-  const image = await (await call(url, "POST", "/v1/images", { body: await lettering(), headers })).json();
+  const client = new ApiClient(url);
+  const cloud = await uploadBytes(client, "Embossed plate", plate(side));
+  const session = await openSession(client, cloud, { name: "Figure 10", scales: [0.06] });
+  const image = await client.uploadImage(await lettering());
   const letters = (threshold, side) => ({
     mode: "add",
     shape: {
@@ -143,21 +144,24 @@ async function embossedPlate(url) {
       projection: { type: "texture", repeat: false },
     },
   });
-  await put(url, session, "zero", [letters(0.12, "below")]);
-  await put(url, session, "one", [letters(0.88, "above")]);
+  await put(client, session, "zero", [letters(0.12, "below")]);
+  await put(client, session, "one", [letters(0.88, "above")]);
   const above = { position: [0.2, -1.9, 2.5], target: [0, 0, 0], up: [0, 0, 1] };
   const file = (name) => resolve(out, `${name}.png`);
   await takePicture(url, session.id, file("letters"), { camera: above, mode: "regions", size });
   const finest = session.levels.length - 1;
-  await commit(url, session, { level: finest, deformation: { type: "translation", vector: [0, 0, 0.09] } });
+  await commit(client, session, {
+    level: finest,
+    deformation: { type: "translation", vector: [0, 0, 0.09] },
+  });
   await takePicture(url, session.id, file("embossed"), { camera: above, mode: "shaded", size });
 
   const half = (sign, x) => ({
     mode: "add",
     shape: { type: "half_space", point: [sign * x, 0, 0], normal: [sign, 0, 0] },
   });
-  await put(url, session, "zero", [half(-1, 0.85)]);
-  await put(url, session, "one", [half(1, 0.85)]);
+  await put(client, session, "zero", [half(-1, 0.85)]);
+  await put(client, session, "one", [half(1, 0.85)]);
   // Straight up, off the slope's normal: where one resolution moves the letters with it, they lean.
   const lift = { type: "translation", vector: [0, 0, 1.3] };
   const beside = { position: [0.15, -2.6, 1.55], target: [0.05, -0.1, 0.6], up: [0, 0, 1] };
@@ -165,9 +169,9 @@ async function embossedPlate(url) {
     ["single-resolution", finest],
     ["multiresolution", 0],
   ]) {
-    await commit(url, session, { level, deformation: lift });
+    await commit(client, session, { level, deformation: lift });
     await takePicture(url, session.id, file(name), { camera: beside, mode: "shaded", size });
-    await call(url, "PUT", `${session.path}/head`, { json: { edit: 1 } });
+    await goTo(client, session, 1);
   }
   const figure = resolve(out, "figure-10.jpg");
   const rows = [

@@ -176,6 +176,10 @@ export function createEditor(
     const { createModelForm } = await import("./ui/model-form");
     return createModelForm(bus, client, store, regions, holder);
   });
+  const savedFold = createLazyFold(bus, "Saved regions", async () => {
+    const { createSavedRegions } = await import("./ui/saved-regions");
+    return createSavedRegions(bus, store, regions);
+  });
   if (link.ui) listen(shortcuts);
   root.append(
     createTopBar(bus, client, store),
@@ -184,7 +188,7 @@ export function createEditor(
     h(
       "aside",
       { class: "side panel", aria: { label: "Properties" } },
-      createRegionsPanel(bus, store, regions, size.radius, reach, imageFold, modelFold),
+      createRegionsPanel(bus, store, regions, size.radius, reach, savedFold, imageFold, modelFold),
       transformPanel.element,
       createDisplayPanel(bus, document, {
         settings: display,

@@ -57,6 +57,7 @@ class RemoteCommands {
 void add_cloud_commands(CLI::App& app, RemoteCommands& commands);
 void add_session_commands(CLI::App& app, RemoteCommands& commands);
 void add_paint_command(CLI::App& app, RemoteCommands& commands);
+void add_region_commands(CLI::App& app, RemoteCommands& commands);
 void add_edit_commands(CLI::App& app, RemoteCommands& commands);
 void add_history_commands(CLI::App& app, RemoteCommands& commands);
 void add_recipe_commands(CLI::App& app, RemoteCommands& commands);

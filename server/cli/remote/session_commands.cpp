@@ -3,6 +3,7 @@
 #include <iomanip>
 #include <map>
 
+#include "protocol/json/requests.h"
 #include "server/cli/remote/arguments.h"
 #include "server/cli/remote/commands.h"
 #include "server/ingest/files.h"
@@ -44,6 +45,7 @@ struct PaintOptions {
   std::string half_space;
   std::string stroke;
   std::string points;
+  std::string of_region;
   std::string operation;
   std::string facing;
   std::string flood;
@@ -82,6 +84,7 @@ std::vector<json> shapes_of(const PaintOptions& options) {
     const auto [radius, points] = radius_and_points("--points", options.points);
     shapes.push_back({{"type", "points"}, {"points", points}, {"radius", radius}});
   }
+  if (!options.of_region.empty()) shapes.push_back({{"type", "region"}, {"region", options.of_region}});
   if (options.all) shapes.push_back({{"type", "all"}});
   return shapes;
 }
@@ -115,6 +118,24 @@ json operation_of(const PaintOptions& options) {
   json operation = std::move(made.front());
   if (options.steal) operation["steal"] = true;
   return operation;
+}
+
+/// Samples of a region, of those that a session's document names.
+json samples_in(const json& regions, const std::string& name) {
+  if (const auto own = regions.find(name); own != regions.end() && own->is_object())
+    return own->at("samples");
+  for (const json& region : regions.value("named", json::array()))
+    if (region.at("region") == name) return region.at("samples");
+  return 0;
+}
+
+/// Checks an argument before anything is asked of the server.
+CLI::Validator is_region() {
+  return {[](std::string& name) -> std::string {
+            if (protocol::region_of_name(name) || protocol::is_valid_region_name(name)) return {};
+            return "no name of a region: 1 to 64 letters, digits, spaces, dots, dashes or underscores, not t";
+          },
+          ""};
 }
 
 struct EditOptions {
@@ -266,25 +287,28 @@ void step(const Context& context, const std::string& session, std::int64_t by) {
 void add_paint_command(CLI::App& app, RemoteCommands& commands) {
   const auto options = std::make_shared<PaintOptions>();
   CLI::App* const command = commands.add(
-      app, "paint", "paint the zero-region, which stays, or the one-region, which moves",
+      app, "paint",
+      "paint the zero-region, which stays, the one-region, which moves, or one that is kept under a name",
       [options](const Context& context) {
         const json operation = operation_of(*options);
-        const std::string path = path_of(options->session) + "/regions/" + options->region + "/operations";
+        const std::string path =
+            path_of(options->session) + "/regions/" + url_encoded(options->region) + "/operations";
         const HttpAnswer answer = context.service.ask("POST", path, operation, if_match(options->revision));
         context.show(answer, [&](const json& session) {
           context.out << session.at("changed") << " samples changed, "
-                      << session.at("regions").at(options->region).at("samples") << " in the region\n";
+                      << samples_in(session.at("regions"), options->region) << " in the region\n";
         });
       });
   command->add_option("SESSION", options->session, "its id")->required();
-  command->add_option("REGION", options->region, "zero or one")
+  command->add_option("REGION", options->region, "zero, one, or the name of another region")
       ->required()
-      ->check(CLI::IsMember({"zero", "one"}));
+      ->check(is_region());
   command->add_option("--sphere", options->sphere, "x,y,z,radius");
   command->add_option("--box", options->box, "x,y,z of one corner and of the opposite one");
   command->add_option("--half-space", options->half_space, "x,y,z of a point and of the normal");
   command->add_option("--stroke", options->stroke, "radius, then x,y,z of each vertex");
   command->add_option("--points", options->points, "radius, then x,y,z of each point");
+  command->add_option("--region", options->of_region, "the samples that a region has now: its name");
   command->add_flag("--all", options->all, "all samples");
   command->add_option("--mode", options->mode, "what a shape does: add, remove, intersect or set")
       ->check(CLI::IsMember({"add", "remove", "intersect", "set"}))
@@ -301,6 +325,32 @@ void add_paint_command(CLI::App& app, RemoteCommands& commands) {
   command->add_option("--operation", options->operation, "any operation, as JSON, @FILE or @-");
   command->add_flag("--steal", options->steal, "samples that join leave the other region");
   command->add_option("--if-revision", options->revision, "refuse unless the session is at this revision");
+}
+
+void add_region_commands(CLI::App& app, RemoteCommands& commands) {
+  struct Options {
+    std::string session;
+    std::string region;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* const group = RemoteCommands::add_group(app, "region", "the regions of a session");
+  CLI::App* const list = commands.add(*group, "list", "all regions", [options](const Context& context) {
+    const HttpRequest request{.path = path_of(options->session) + "/regions"};
+    context.show(context.service.ask(request), [&](const json& document) {
+      for (const json& region : document.at("regions"))
+        context.out << std::left << std::setw(24) << region.at("region").get<std::string>() << std::right
+                    << std::setw(12) << region.at("samples") << "\n";
+    });
+  });
+  CLI::App* const remove = commands.add(
+      *group, "delete", "delete a region that was given a name; clear zero or one",
+      [options](const Context& context) {
+        const std::string path = path_of(options->session) + "/regions/" + url_encoded(options->region);
+        (void)context.service.ask("DELETE", path, nullptr);
+      });
+  for (CLI::App* const command : {list, remove})
+    command->add_option("SESSION", options->session, "its id")->required();
+  remove->add_option("REGION", options->region, "its name")->required();
 }
 
 void add_edit_commands(CLI::App& app, RemoteCommands& commands) {

@@ -24,7 +24,10 @@ void tell_session(std::ostream& out, const json& session) {
       << "name        " << session.at("name").get<std::string>() << "\n"
       << "state       " << session.at("state").get<std::string>() << "\n"
       << "revision    " << session.at("revision") << "\n"
-      << "samples     " << session.at("sample_count") << "\n"
+      << "samples     " << session.at("sample_count");
+  if (const auto preview = session.find("preview"); preview != session.end())
+    out << " (a preview of " << preview->at("of") << ")";
+  out << "\n"
       << "zero        " << session.at("regions").at("zero").at("samples") << "\n"
       << "one         " << session.at("regions").at("one").at("samples") << "\n"
       << "edits       " << session.at("history").at("head") << " of " << session.at("history").at("edits")
@@ -76,6 +79,7 @@ struct Wanted {
   std::string job_output;
   UploadOptions upload;
   std::optional<int> neighbors;
+  std::optional<std::uint64_t> preview;
   std::optional<double> timeout;
   std::uint64_t offset = 0;
   bool wait = false;
@@ -177,6 +181,7 @@ void add_session_commands(CLI::App& app, RemoteCommands& commands) {
         if (!wanted->name.empty()) body["name"] = wanted->name;
         if (!wanted->scales.empty()) body["scales"] = numbers_of("--scales", wanted->scales, 0);
         if (wanted->neighbors) body["neighbors"] = *wanted->neighbors;
+        if (wanted->preview) body["preview"] = {{"count", *wanted->preview}};
         HttpAnswer answer = context.service.ask("POST", "/v1/sessions", body);
         const std::string id = document_of(answer).at("id").get<std::string>();
         if (wanted->wait) answer = wait_for_session(context, id, wanted->timeout);
@@ -186,6 +191,7 @@ void add_session_commands(CLI::App& app, RemoteCommands& commands) {
   create->add_option("--name", wanted->name, "of the session");
   create->add_option("--scales", wanted->scales, "smoothing scales, coarsest first: 0.04,0.02,0.01");
   create->add_option("--neighbors", wanted->neighbors, "of a sample's neighbourhood, 4 to 32");
+  create->add_option("--preview", wanted->preview, "edit so many of the cloud's samples, evenly spread");
   create->add_flag("--wait", wanted->wait, "until it is ready");
   commands.add(*group, "list", "all sessions", [](const Context& context) {
     context.show(context.service.ask(HttpRequest{.path = "/v1/sessions"}), [&](const json& document) {

@@ -6,9 +6,10 @@ import type {
   ExportFormat,
   History,
   ImageDocument,
+  ImportDocument,
+  NamedRegion,
   NewShare,
   RecordedOperation,
-  RegionName,
   RegionOperation,
   ServiceInfo,
   SessionDocument,
@@ -19,6 +20,9 @@ import type {
 export type Fetch = (input: string, init?: RequestInit) => Promise<Response>;
 
 export const STREAM_ATTRIBUTES = "normal,t,detail,color,marks,radius";
+
+const regionPath = (id: string, region: string): string =>
+  `v1/sessions/${id}/regions/${encodeURIComponent(region)}`;
 
 /** Seconds as `Retry-After` gives them; undefined where it gives none. */
 function retryAfter(response: Response): number | undefined {
@@ -94,6 +98,20 @@ export class ApiClient {
     await this.request(`v1/clouds/${id}`, { method: "DELETE" });
   }
 
+  /** Begins to make a cloud of a complete resumable upload; it is asked for how far it is. */
+  importUpload(body: { upload: string; name?: string; nonfinite?: string }): Promise<ImportDocument> {
+    return this.send("POST", "v1/clouds", body, { Prefer: "respond-async" });
+  }
+
+  import(id: string): Promise<ImportDocument> {
+    return this.json(`v1/imports/${id}`);
+  }
+
+  /** Ends an import, or forgets one that has ended. */
+  async deleteImport(id: string): Promise<void> {
+    await this.request(`v1/imports/${id}`, { method: "DELETE" });
+  }
+
   async sessions(): Promise<SessionSummary[]> {
     return (await this.json<{ sessions: SessionSummary[] }>("v1/sessions")).sessions;
   }
@@ -102,8 +120,13 @@ export class ApiClient {
     return this.json(`v1/sessions/${id}`);
   }
 
-  createSession(cloud: string, options: { name?: string; scales?: number[] } = {}): Promise<SessionDocument> {
+  /** `preview`: on so many of the cloud's samples. */
+  createSession(
+    cloud: string,
+    options: { name?: string; scales?: number[]; preview?: number } = {},
+  ): Promise<SessionDocument> {
     const body: Record<string, unknown> = { cloud };
+    if (options.preview !== undefined) body["preview"] = { count: options.preview };
     if (options.name !== undefined) body["name"] = options.name;
     if (options.scales !== undefined) body["scales"] = options.scales;
     return this.send("POST", "v1/sessions", body);
@@ -113,29 +136,34 @@ export class ApiClient {
     await this.request(`v1/sessions/${id}`, { method: "DELETE" });
   }
 
-  async regionOperations(id: string, region: RegionName): Promise<RecordedOperation[]> {
-    return (await this.json<{ operations: RecordedOperation[] }>(`v1/sessions/${id}/regions/${region}`))
-      .operations;
+  /** All regions, in short: zero, one, and the named ones. */
+  async regions(id: string): Promise<NamedRegion[]> {
+    return (await this.json<{ regions: NamedRegion[] }>(`v1/sessions/${id}/regions`)).regions;
+  }
+
+  async regionOperations(id: string, region: string): Promise<RecordedOperation[]> {
+    return (await this.json<{ operations: RecordedOperation[] }>(regionPath(id, region))).operations;
   }
 
   addOperation(
     id: string,
-    region: RegionName,
+    region: string,
     operation: RegionOperation,
   ): Promise<SessionDocument & { changed: number }> {
-    return this.send("POST", `v1/sessions/${id}/regions/${region}/operations`, operation);
+    return this.send("POST", `${regionPath(id, region)}/operations`, operation);
   }
 
   putOperations(
     id: string,
-    region: RegionName,
+    region: string,
     operations: readonly RecordedOperation[],
   ): Promise<SessionDocument> {
-    return this.send("PUT", `v1/sessions/${id}/regions/${region}`, { operations });
+    return this.send("PUT", regionPath(id, region), { operations });
   }
 
-  clearRegion(id: string, region: RegionName): Promise<SessionDocument> {
-    return this.json(`v1/sessions/${id}/regions/${region}`, { method: "DELETE" });
+  /** Clears the zero- or the one-region; deletes another one. */
+  clearRegion(id: string, region: string): Promise<SessionDocument> {
+    return this.json(regionPath(id, region), { method: "DELETE" });
   }
 
   async putPreview(id: string, edit: EditBody, sequence: number): Promise<void> {

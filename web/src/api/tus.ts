@@ -1,5 +1,5 @@
 import type { ApiClient } from "./client";
-import { ApiError } from "./problem";
+import { ApiError, networkProblem } from "./problem";
 import type { CloudDocument } from "./types";
 import type { UploadOptions } from "./upload";
 
@@ -97,14 +97,66 @@ export async function uploadInPieces(
     }
   }
   options.onProgress?.(1);
-  const id = upload.split("/").pop();
-  const body = JSON.stringify({
-    upload: id,
-    name: file.name,
-    nonfinite: options.dropNonFinite ? "drop" : "reject",
-  });
-  const headers = { "Content-Type": "application/json" };
-  const cloud = await client.request("v1/clouds", { method: "POST", headers, body, ...signal });
-  memory.removeItem(key);
-  return (await cloud.json()) as CloudDocument;
+  try {
+    const cloud = await importAsked(client, upload.split("/").pop() ?? "", file.name, options, pause);
+    memory.removeItem(key);
+    return cloud;
+  } catch (error) {
+    // A refused upload is there still: the next try is quick.
+    if (options.signal?.aborted) memory.removeItem(key);
+    throw error;
+  }
+}
+
+/** Makes a cloud of a complete upload, and tells how far that is. Given up by hand, it ends and the upload goes. */
+async function importAsked(
+  client: ApiClient,
+  upload: string,
+  name: string,
+  options: PieceOptions,
+  pause: (ms: number) => Promise<void>,
+): Promise<CloudDocument> {
+  const nonfinite = options.dropNonFinite ? "drop" : "reject";
+  let asked = await client.importUpload({ upload, name, nonfinite });
+  let wait = 100;
+  let failures = 0;
+  for (;;) {
+    if (options.signal?.aborted) {
+      await client.deleteImport(asked.id).catch(() => undefined);
+      await removeUpload(client, `v1/uploads/${upload}`, pause);
+      throw new DOMException("The import was cancelled.", "AbortError");
+    }
+    options.onImport?.(asked.progress);
+    if (asked.state === "successful" && asked.cloud) {
+      await client.deleteImport(asked.id).catch(() => undefined);
+      return asked.cloud;
+    }
+    if (asked.state === "failed") throw new ApiError(asked.problem ?? networkProblem("The import failed."));
+    await pause(wait);
+    wait = Math.min(1.5 * wait, 1000);
+    try {
+      asked = await client.import(asked.id);
+      failures = 0;
+    } catch (error) {
+      failures += 1;
+      if (!isPassing(error) || failures > MOST_TRIES) throw error;
+    }
+  }
+}
+
+/** Removes an upload that an ending import may have for a moment yet. */
+async function removeUpload(
+  client: ApiClient,
+  upload: string,
+  pause: (ms: number) => Promise<void>,
+): Promise<void> {
+  for (let tries = 0; tries < MOST_TRIES; ++tries) {
+    try {
+      await client.request(upload, { method: "DELETE", headers: VERSION });
+      return;
+    } catch (error) {
+      if (!isPassing(error)) return;
+      await pause(250);
+    }
+  }
 }

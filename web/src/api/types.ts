@@ -13,9 +13,12 @@ type WithVectors<Type> = Type extends number[]
       ? { [Name in keyof Type]: WithVectors<Type[Name]> }
       : Type;
 
-export type RegionName = Schemas["Painting"]["region"];
+/** The regions that edits are made with. Others have names of their own. */
+export type RegionName = "zero" | "one";
+export type NamedRegion = Schemas["RegionEntry"];
 export type ExportFormat = "ply" | "draco" | "xyz";
 
+export type ImportDocument = WithVectors<Schemas["Import"]>;
 export type CloudDocument = WithVectors<Schemas["Cloud"]>;
 export type SessionDocument = WithVectors<Schemas["Session"]>;
 export type SessionSummary = WithVectors<Schemas["SessionSummary"]>;

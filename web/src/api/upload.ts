@@ -1,6 +1,6 @@
 import type { ApiClient } from "./client";
 import { ApiError, networkProblem, problemFromBody } from "./problem";
-import type { CloudDocument } from "./types";
+import type { CloudDocument, ImportDocument } from "./types";
 
 /** The media type to send a file as; what the name does not tell is left to the server, which looks at the bytes. */
 export function mediaTypeOf(name: string): string {
@@ -23,6 +23,8 @@ export interface UploadOptions {
   token?: string | null;
   signal?: AbortSignal;
   onProgress?: (fraction: number) => void;
+  /** Once all of it was sent: what the server does with it, and how much of that is done. */
+  onImport?: (progress: ImportDocument["progress"]) => void;
 }
 
 /** Sends a file as a new cloud. */

@@ -98,6 +98,35 @@ export class RegionEditor {
     });
   }
 
+  /** Keeps what a region has now under a name of its own, instead of what was kept there before. */
+  save(name: string, from: RegionName): Promise<SessionDocument | null> {
+    const operation = { mode: "set", shape: { type: "region", region: from } };
+    return this.keep("The region was not saved", () =>
+      this.client_.putOperations(this.store_.id, name, [operation]),
+    );
+  }
+
+  /** Forgets a saved region; what was painted with it stays. */
+  forget(name: string): Promise<SessionDocument | null> {
+    return this.keep("The saved region was not deleted", () =>
+      this.client_.clearRegion(this.store_.id, name),
+    );
+  }
+
+  /** Changes nothing that is painted. */
+  private async keep(what: string, request: () => Promise<SessionDocument>): Promise<SessionDocument | null> {
+    try {
+      return await this.queue_.enqueue(async () => {
+        const document = await request();
+        this.store_.update(document);
+        return document;
+      });
+    } catch (error) {
+      reportError(this.bus_, error, what);
+      return null;
+    }
+  }
+
   /** Applies a recipe: its edits, and the regions of its last one instead of both; undone together. Throws where refused. */
   async applyRecipe(recipe: unknown): Promise<void> {
     try {

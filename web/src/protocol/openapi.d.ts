@@ -244,6 +244,9 @@ export interface paths {
          *     unless `nonfinite=drop`; duplicates are kept and counted. Coordinates beyond 1e9, and an extent too small for its
          *     distance from zero, are refused. The document's `report` says what was found. A JSON body names a complete
          *     resumable upload instead, without a query; it is removed where the import succeeds, and kept where it does not.
+         *
+         *     With `Prefer: respond-async` the answer comes as soon as the file is there (202): an import to ask how far it is, and
+         *     to end. Imports do not outlive the daemon; where one ends with it, a resumable upload stays and can be imported again.
          */
         post: operations["uploadCloud"];
         delete?: never;
@@ -286,6 +289,46 @@ export interface paths {
         put?: never;
         post?: never;
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/imports": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** All imports that are under way or have ended lately */
+        get: operations["listImports"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/imports/{import}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                import: components["schemas"]["Id"];
+            };
+            cookie?: never;
+        };
+        /** How far an import is, and its cloud or its problem once it has ended */
+        get: operations["getImport"];
+        put?: never;
+        post?: never;
+        /**
+         * End an import, or forget one that has ended
+         * @description Decoding ends at once. A cloud that is stored already stays; so does a resumable upload that is none.
+         */
+        delete: operations["deleteImport"];
         options?: never;
         head?: never;
         patch?: never;
@@ -489,23 +532,49 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sessions/{session}/regions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        /** All regions, in short */
+        get: operations["listRegions"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sessions/{session}/regions/{region}": {
         parameters: {
             query?: never;
             header?: never;
             path: {
                 session: components["parameters"]["SessionId"];
-                /** @description zero stays where it is, one moves in full */
+                /**
+                 * @description zero stays where it is, one moves in full. Any other name is of a region that is kept for operations to use: it has a
+                 *     painting as these two have, keeps its samples through all edits, and shares them with other regions. Not "t", "." and
+                 *     "..".
+                 */
                 region: components["parameters"]["Region"];
             };
             cookie?: never;
         };
         /** The painting of a region */
         get: operations["getPainting"];
-        /** Replace the whole painting of a region */
+        /**
+         * Replace the whole painting of a region
+         * @description A region of another name than zero and one is made where there is none; its number is limited (429).
+         */
         put: operations["replacePainting"];
         post?: never;
-        /** Clear a region */
+        /** Clear the zero- or the one-region; delete another one */
         delete: operations["clearPainting"];
         options?: never;
         head?: never;
@@ -518,7 +587,11 @@ export interface paths {
             header?: never;
             path: {
                 session: components["parameters"]["SessionId"];
-                /** @description zero stays where it is, one moves in full */
+                /**
+                 * @description zero stays where it is, one moves in full. Any other name is of a region that is kept for operations to use: it has a
+                 *     painting as these two have, keeps its samples through all edits, and shares them with other regions. Not "t", "." and
+                 *     "..".
+                 */
                 region: components["parameters"]["Region"];
             };
             cookie?: never;
@@ -961,6 +1034,14 @@ export interface components {
              * @default 10
              */
             neighbors: number;
+            /**
+             * @description Edit a part of the cloud: so many of its samples, evenly spread, each as the cloud has it to the bit, and always
+             *     the same ones. Scales stay fractions of the whole cloud's diagonal, so the session's recipe fits a session on all of
+             *     it. A count of at least the cloud's gives a session on all samples, as does leaving this out.
+             */
+            preview?: {
+                count: number;
+            };
         };
         Progress: {
             /** @description What is being done */
@@ -980,9 +1061,38 @@ export interface components {
             max_detail: number;
             rms_detail: number;
         };
+        RegionName: string;
+        RegionEntry: {
+            region: components["schemas"]["RegionName"];
+            samples: components["schemas"]["Count"];
+            operations: components["schemas"]["Count"];
+        };
+        RegionList: {
+            regions: components["schemas"]["RegionEntry"][];
+        };
         RegionSummary: {
             samples: components["schemas"]["Count"];
             operations: components["schemas"]["Count"];
+        };
+        /** @description A cloud on its way in, while its client goes on */
+        Import: {
+            id: components["schemas"]["Id"];
+            /** @description Of the cloud */
+            name: components["schemas"]["Name"];
+            /** @description Of the file */
+            bytes: components["schemas"]["Count"];
+            created: components["schemas"]["Time"];
+            /** @enum {string} */
+            state: "accepted" | "running" | "successful" | "failed";
+            /** @description Waiting, decoding, ordering, hashing, storing, ready */
+            progress: components["schemas"]["Progress"];
+            /** @description Where the state is failed: why */
+            problem?: components["schemas"]["Problem"];
+            /** @description Where the state is successful */
+            cloud?: components["schemas"]["Cloud"];
+        };
+        ImportList: {
+            imports: components["schemas"]["Import"][];
         };
         /** @enum {string} */
         SessionState: "building" | "ready" | "failed" | "asleep";
@@ -994,8 +1104,15 @@ export interface components {
             /** @description Grows by one with each painting, edit and head move */
             revision: components["schemas"]["Count"];
             created: components["schemas"]["Time"];
-            /** @description Of the surface as edited; while the session is building, of its cloud */
+            /** @description Of the surface as edited; while the session is building, those that it begins with */
             sample_count: components["schemas"]["Count"];
+            /** @description Of a session on a part of its cloud; absent where it has all samples */
+            preview?: {
+                /** @description Samples that it began with */
+                count: components["schemas"]["Count"];
+                /** @description Samples of the cloud */
+                of: components["schemas"]["Count"];
+            };
         };
         SessionList: {
             sessions: components["schemas"]["SessionSummary"][];
@@ -1021,6 +1138,8 @@ export interface components {
             regions: {
                 zero: components["schemas"]["RegionSummary"];
                 one: components["schemas"]["RegionSummary"];
+                /** @description The others, by name */
+                named: components["schemas"]["RegionEntry"][];
             };
             history: {
                 /** @description Edits that are applied */
@@ -1038,7 +1157,7 @@ export interface components {
             /** @description Samples that changed their mark */
             changed: components["schemas"]["Count"];
         };
-        Shape: components["schemas"]["SphereShape"] | components["schemas"]["StrokeShape"] | components["schemas"]["BoxShape"] | components["schemas"]["HalfSpaceShape"] | components["schemas"]["AllShape"] | components["schemas"]["PointsShape"] | components["schemas"]["ScreenShape"] | components["schemas"]["ImageShape"] | components["schemas"]["ModelShape"];
+        Shape: components["schemas"]["SphereShape"] | components["schemas"]["StrokeShape"] | components["schemas"]["BoxShape"] | components["schemas"]["HalfSpaceShape"] | components["schemas"]["AllShape"] | components["schemas"]["PointsShape"] | components["schemas"]["ScreenShape"] | components["schemas"]["ImageShape"] | components["schemas"]["ModelShape"] | components["schemas"]["RegionShape"];
         SphereShape: {
             /** @constant */
             type: "sphere";
@@ -1158,6 +1277,15 @@ export interface components {
             /** @description Model units of the session's cloud */
             thickness: number;
         };
+        /**
+         * @description The samples that a region of the session has when this is painted: zero, one, or one that was given a name. The
+         *     painting keeps what it painted: the region may be deleted afterwards. Not in recipes, which hold volumes
+         */
+        RegionShape: {
+            /** @constant */
+            type: "region";
+            region: components["schemas"]["RegionName"];
+        };
         ScreenPoint: number[];
         /** @description A lasso, closed by itself; inside is where it turns around a point an odd number of times */
         PolygonOutline: {
@@ -1256,8 +1384,7 @@ export interface components {
             operations: components["schemas"]["PaintOperation"][];
         };
         Painting: {
-            /** @enum {string} */
-            region: "zero" | "one";
+            region: components["schemas"]["RegionName"];
             samples: components["schemas"]["Count"];
             operations: components["schemas"]["PaintOperation"][];
         };
@@ -1543,8 +1670,12 @@ export interface components {
         TokenId: components["schemas"]["Id"];
         ShareId: components["schemas"]["Id"];
         SessionId: components["schemas"]["Id"];
-        /** @description zero stays where it is, one moves in full */
-        Region: "zero" | "one";
+        /**
+         * @description zero stays where it is, one moves in full. Any other name is of a region that is kept for operations to use: it has a
+         *     painting as these two have, keeps its samples through all edits, and shares them with other regions. Not "t", "." and
+         *     "..".
+         */
+        Region: components["schemas"]["RegionName"];
         /** @description The number of an edit in the history; the first one has 1 */
         EditIndex: number;
         /** @description The name that others see while the stream is open */
@@ -1560,7 +1691,10 @@ export interface components {
          * @description What a frame carries beside the positions, as far as the cloud has it: normal (which it has unless told otherwise), t,
          *     detail, color, marks, ids, radius. Of a file, as of a cloud's: what it keeps; all of the cloud's where this is absent.
          *     detail is a scalar of its own there, and comes where it is named; so are stretch and minor_stretch (the principal
-         *     stretches of each sample's cell, factors), anisotropy (their quotient) and area_change (their product).
+         *     stretches of each sample's cell, factors), anisotropy (their quotient), area_change (their product), stretch_x,
+         *     stretch_y and stretch_z (the direction of the larger stretch, a unit vector whose longest component is positive; zero
+         *     where neither is larger by a thousandth), and cloud_index (the place of the sample in the uploaded cloud, counted
+         *     from 0; 4294967295 for an inserted one).
          */
         Attributes: string[];
         /** @description What the file keeps beside the positions: normal, color, texcoord, and scalars by name. Absent: all. */
@@ -1949,6 +2083,8 @@ export interface operations {
             header?: {
                 /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
+                /** @description `respond-async`: do not wait for the cloud (RFC 7240) */
+                Prefer?: string;
             };
             path?: never;
             cookie?: never;
@@ -1976,6 +2112,18 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Cloud"];
+                };
+            };
+            /** @description Under way, as was preferred */
+            202: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied"?: "respond-async";
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Import"];
                 };
             };
             400: components["responses"]["Problem"];
@@ -2065,6 +2213,69 @@ export interface operations {
             404: components["responses"]["Problem"];
             406: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    listImports: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Imports, oldest first */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportList"];
+                };
+            };
+            default: components["responses"]["Problem"];
+        };
+    };
+    getImport: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                import: components["schemas"]["Id"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The import */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Import"];
+                };
+            };
+            404: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    deleteImport: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                import: components["schemas"]["Id"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            204: components["responses"]["Done"];
+            404: components["responses"]["Problem"];
             default: components["responses"]["Problem"];
         };
     };
@@ -2572,13 +2783,44 @@ export interface operations {
             default: components["responses"]["Problem"];
         };
     };
+    listRegions: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                session: components["parameters"]["SessionId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The zero- and the one-region, then the others by name */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    ETag: components["headers"]["ETag"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RegionList"];
+                };
+            };
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
     getPainting: {
         parameters: {
             query?: never;
             header?: never;
             path: {
                 session: components["parameters"]["SessionId"];
-                /** @description zero stays where it is, one moves in full */
+                /**
+                 * @description zero stays where it is, one moves in full. Any other name is of a region that is kept for operations to use: it has a
+                 *     painting as these two have, keeps its samples through all edits, and shares them with other regions. Not "t", "." and
+                 *     "..".
+                 */
                 region: components["parameters"]["Region"];
             };
             cookie?: never;
@@ -2609,7 +2851,11 @@ export interface operations {
             };
             path: {
                 session: components["parameters"]["SessionId"];
-                /** @description zero stays where it is, one moves in full */
+                /**
+                 * @description zero stays where it is, one moves in full. Any other name is of a region that is kept for operations to use: it has a
+                 *     painting as these two have, keeps its samples through all edits, and shares them with other regions. Not "t", "." and
+                 *     "..".
+                 */
                 region: components["parameters"]["Region"];
             };
             cookie?: never;
@@ -2628,6 +2874,7 @@ export interface operations {
             413: components["responses"]["Problem"];
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
+            429: components["responses"]["Busy"];
             503: components["responses"]["Busy"];
             507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
@@ -2642,7 +2889,11 @@ export interface operations {
             };
             path: {
                 session: components["parameters"]["SessionId"];
-                /** @description zero stays where it is, one moves in full */
+                /**
+                 * @description zero stays where it is, one moves in full. Any other name is of a region that is kept for operations to use: it has a
+                 *     painting as these two have, keeps its samples through all edits, and shares them with other regions. Not "t", "." and
+                 *     "..".
+                 */
                 region: components["parameters"]["Region"];
             };
             cookie?: never;
@@ -2669,7 +2920,11 @@ export interface operations {
             };
             path: {
                 session: components["parameters"]["SessionId"];
-                /** @description zero stays where it is, one moves in full */
+                /**
+                 * @description zero stays where it is, one moves in full. Any other name is of a region that is kept for operations to use: it has a
+                 *     painting as these two have, keeps its samples through all edits, and shares them with other regions. Not "t", "." and
+                 *     "..".
+                 */
                 region: components["parameters"]["Region"];
             };
             cookie?: never;
@@ -2739,7 +2994,10 @@ export interface operations {
                  * @description What a frame carries beside the positions, as far as the cloud has it: normal (which it has unless told otherwise), t,
                  *     detail, color, marks, ids, radius. Of a file, as of a cloud's: what it keeps; all of the cloud's where this is absent.
                  *     detail is a scalar of its own there, and comes where it is named; so are stretch and minor_stretch (the principal
-                 *     stretches of each sample's cell, factors), anisotropy (their quotient) and area_change (their product).
+                 *     stretches of each sample's cell, factors), anisotropy (their quotient), area_change (their product), stretch_x,
+                 *     stretch_y and stretch_z (the direction of the larger stretch, a unit vector whose longest component is positive; zero
+                 *     where neither is larger by a thousandth), and cloud_index (the place of the sample in the uploaded cloud, counted
+                 *     from 0; 4294967295 for an inserted one).
                  */
                 attributes?: components["parameters"]["Attributes"];
             };
@@ -3060,7 +3318,10 @@ export interface operations {
                  * @description What a frame carries beside the positions, as far as the cloud has it: normal (which it has unless told otherwise), t,
                  *     detail, color, marks, ids, radius. Of a file, as of a cloud's: what it keeps; all of the cloud's where this is absent.
                  *     detail is a scalar of its own there, and comes where it is named; so are stretch and minor_stretch (the principal
-                 *     stretches of each sample's cell, factors), anisotropy (their quotient) and area_change (their product).
+                 *     stretches of each sample's cell, factors), anisotropy (their quotient), area_change (their product), stretch_x,
+                 *     stretch_y and stretch_z (the direction of the larger stretch, a unit vector whose longest component is positive; zero
+                 *     where neither is larger by a thousandth), and cloud_index (the place of the sample in the uploaded cloud, counted
+                 *     from 0; 4294967295 for an inserted one).
                  */
                 attributes?: components["parameters"]["Attributes"];
             };

@@ -1,4 +1,5 @@
 import type { CloudDocument, SessionSummary } from "../api/types";
+import { parsePreview, previewText } from "../edits/preview-size";
 import { DEFAULT_SCALES, parseScales, scalesText } from "../edits/scales";
 import { sessionUrl } from "../link";
 import { h, setText } from "./dom";
@@ -10,8 +11,11 @@ export interface CloudCardOptions {
   cloud: CloudDocument;
   /** Newest first. */
   sessions: readonly SessionSummary[];
-  /** Starts a session whose base levels are smoothed at these parts of the diagonal, the coarsest first. */
-  start: (scales: number[]) => Promise<void>;
+  /**
+   * Starts a session whose base levels are smoothed at these parts of the diagonal, the coarsest first; on so many of the
+   * samples, or on all.
+   */
+  start: (scales: number[], preview: number | undefined) => Promise<void>;
   removeCloud: () => Promise<void>;
   removeSession: (id: string) => Promise<void>;
 }
@@ -59,7 +63,9 @@ function importNotes(cloud: CloudDocument): string {
 }
 
 function startForm(options: CloudCardOptions): HTMLElement {
+  const { sample_count: whole } = options.cloud;
   const field = textField("Scales", scalesText(DEFAULT_SCALES), "% of the diagonal");
+  const samples = textField("Samples", previewText(whole), `of ${formatCount(whole)}`);
   const fault = h("p", { class: "hint obstacle start-fault", aria: { live: "polite" } });
   const button = h(
     "button",
@@ -74,30 +80,37 @@ function startForm(options: CloudCardOptions): HTMLElement {
       onsubmit: (event) => {
         event.preventDefault();
         const scales = parseScales(field.input.value);
-        const wrong = typeof scales === "string";
-        field.input.setAttribute("aria-invalid", String(wrong));
-        setText(fault, wrong ? scales : "");
-        if (wrong) {
-          field.input.focus();
-          return;
-        }
+        const preview = parsePreview(samples.input.value, whole);
+        const wrongScales = typeof scales === "string";
+        const wrongSamples = typeof preview === "string";
+        field.input.setAttribute("aria-invalid", String(wrongScales));
+        samples.input.setAttribute("aria-invalid", String(wrongSamples));
+        setText(fault, wrongScales ? scales : wrongSamples ? preview : "");
+        if (wrongScales) return field.input.focus();
+        if (wrongSamples) return samples.input.focus();
         button.disabled = true;
-        void options.start(scales).finally(() => {
+        void options.start(scales, preview).finally(() => {
           button.disabled = false;
         });
       },
     },
     field.element,
+    samples.element,
     button,
     fault,
   );
   field.input.title =
     "A base level for each: what is finer than its scale rides along as detail. Coarsest first.";
+  samples.input.inputMode = "numeric";
+  samples.input.title =
+    "How many samples to edit, evenly spread over the cloud. The session's recipe fits the whole cloud.";
   return form;
 }
 
 function sessionRow(session: SessionSummary, options: CloudCardOptions): HTMLElement {
-  const state = session.state === "ready" ? `revision ${session.revision ?? 0}` : session.state;
+  const revision = session.state === "ready" ? `revision ${session.revision ?? 0}` : session.state;
+  const { preview } = session;
+  const state = preview ? `${formatCount(preview.count)} samples · ${revision}` : revision;
   return h(
     "li",
     { class: "session-row" },

@@ -1,6 +1,7 @@
 import type { ApiClient } from "../api/client";
 import { problemOf } from "../api/problem";
 import type { CloudDocument, SessionSummary } from "../api/types";
+import { defaultPreview } from "../edits/preview-size";
 import { DEFAULT_SCALES } from "../edits/scales";
 import { sessionUrl } from "../link";
 import { createCloudCard } from "./cloud-card";
@@ -14,11 +15,14 @@ export async function showHome(root: HTMLElement, client: ApiClient): Promise<vo
   const list = h("div", { class: "cloud-list", aria: { busy: "true" } });
   const count = h("span", { class: "section-aside" });
   const messages = h("div", { class: "home-messages", aria: { live: "polite" } });
-  const uploader = createUploader(client, (cloud) => void open(cloud));
+  const uploader = createUploader(
+    client,
+    (cloud) => void open(cloud, DEFAULT_SCALES, defaultPreview(cloud.sample_count)),
+  );
 
-  const open = async (cloud: CloudDocument, scales = DEFAULT_SCALES): Promise<void> => {
+  const open = async (cloud: CloudDocument, scales: number[], preview?: number): Promise<void> => {
     try {
-      const options = { name: cloud.name, scales };
+      const options = { name: cloud.name, scales, ...(preview === undefined ? {} : { preview }) };
       location.assign(sessionUrl((await client.createSession(cloud.id, options)).id));
     } catch (error) {
       replaceChildren(messages, problemCard("No session could be started", problemOf(error)));
@@ -42,7 +46,7 @@ export async function showHome(root: HTMLElement, client: ApiClient): Promise<vo
         createCloudCard({
           cloud,
           sessions: sessionsOf(cloud, sessions),
-          start: (scales) => open(cloud, scales),
+          start: (scales, preview) => open(cloud, scales, preview),
           removeCloud: () => act("The cloud was not deleted", () => client.deleteCloud(cloud.id)),
           removeSession: (id) => act("The session was not deleted", () => client.deleteSession(id)),
         }),

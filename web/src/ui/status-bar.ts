@@ -23,7 +23,8 @@ export function createStatusBar(bus: Bus, store: SessionStore): HTMLElement {
   let load: LoadStatus = { loaded: first, total: first, complete: true };
   const showSamples = (): void => {
     const { loaded, total, complete } = load;
-    const now = `${formatCount(total)} samples`;
+    const { preview } = store.document;
+    const now = `${formatCount(total)} samples${preview ? `, a preview of ${formatCount(preview.of)}` : ""}`;
     if (!complete && loaded < total) setText(samples, `${formatCount(loaded)} of ${now}`);
     else setText(samples, total === first ? now : `${formatCount(first)} → ${now}`);
     samples.title = total === first ? "" : "As loaded, and as shown";

@@ -7,6 +7,15 @@ import { formatBytes } from "./format";
 import { icon } from "./icons";
 import { problemCard } from "./problem-card";
 
+/** What the server calls the parts of an import, as people read it. */
+const PHASES: Record<string, string> = {
+  waiting: "busy and will soon read",
+  decoding: "reading",
+  ordering: "ordering",
+  hashing: "checking",
+  storing: "storing",
+};
+
 /** Drop a file anywhere, or pick one: it is sent with progress, and refused with reasons. */
 export function createUploader(
   client: ApiClient,
@@ -69,6 +78,10 @@ export function createUploader(
             bar.removeAttribute("value");
             setText(text, `${file.name}: the server is reading it`);
           }
+        },
+        onImport: ({ phase, fraction }) => {
+          bar.value = fraction;
+          setText(text, `${file.name}: the server is ${PHASES[phase] ?? "reading"} it`);
         },
       });
       replaceChildren(status);

@@ -6,7 +6,7 @@ const ID = "u7k8l9m0n1o2p-q_r3s4t5";
 const PIECE = 8 << 20;
 
 /** A server of one upload; `breaks` requests in a row lose their answer. */
-function stand(breaks: number[] = []) {
+function stand(breaks: number[] = [], states: unknown[] = [{ state: "successful", cloud: { id: "cloud" } }]) {
   const log: string[] = [];
   let offset = 0;
   let length = -1;
@@ -14,8 +14,9 @@ function stand(breaks: number[] = []) {
   const fetch = async (url: string, init: RequestInit = {}): Promise<Response> => {
     const headers = new Headers(init.headers);
     const path = url.replace("http://host/", "");
-    log.push(`${init.method} ${path} ${headers.get("Upload-Offset") ?? ""}`.trim());
-    if (path !== "v1/clouds") expect(headers.get("Tus-Resumable")).toBe("1.0.0");
+    log.push(`${init.method ?? "GET"} ${path} ${headers.get("Upload-Offset") ?? ""}`.trim());
+    const told = path.startsWith("v1/imports");
+    if (path !== "v1/clouds" && !told) expect(headers.get("Tus-Resumable")).toBe("1.0.0");
     const missing = () => new Response("{}", { status: 404 });
     count += 1;
     if (init.method === "POST" && path === "v1/uploads") {
@@ -26,7 +27,17 @@ function stand(breaks: number[] = []) {
     if (path === "v1/clouds") {
       expect(JSON.parse(String(init.body))).toEqual({ upload: ID, name: "ö.las", nonfinite: "drop" });
       expect(offset).toBe(length);
-      return new Response(JSON.stringify({ id: "cloud" }), { status: 201 });
+      expect(headers.get("Prefer")).toBe("respond-async");
+      const progress = { phase: "waiting", fraction: 0 };
+      return new Response(JSON.stringify({ id: "import", state: "accepted", progress }), { status: 202 });
+    }
+    if (told && init.method === "DELETE") return new Response(null, { status: 204 });
+    if (told) {
+      const state = states.length > 1 ? states.shift() : states[0];
+      if (state instanceof Error) throw state;
+      return new Response(
+        JSON.stringify({ id: "import", progress: { phase: "x", fraction: 0.5 }, ...(state as object) }),
+      );
     }
     if (length < 0) return missing();
     if (init.method === "PATCH") {
@@ -72,6 +83,8 @@ describe("an upload in pieces", () => {
       `PATCH v1/uploads/${ID} ${PIECE}`,
       `PATCH v1/uploads/${ID} ${2 * PIECE}`,
       "POST v1/clouds",
+      "GET v1/imports/import",
+      "DELETE v1/imports/import",
     ]);
     expect(told).toEqual([0, 0.4, 0.8, 1]);
     expect(store.all.size).toBe(0);
@@ -98,6 +111,42 @@ describe("an upload in pieces", () => {
       "POST v1/uploads",
       `PATCH v1/uploads/${ID} 0`,
     ]);
+  });
+
+  it("asks how far the import is, over a lost answer, until there is a cloud", async () => {
+    const running = { state: "running", progress: { phase: "ordering", fraction: 0.6 } };
+    const { client } = stand(
+      [],
+      [running, new TypeError("lost"), { state: "successful", cloud: { id: "c" } }],
+    );
+    const told: string[] = [];
+    const onImport = ({ phase, fraction }: { phase: string; fraction: number }) =>
+      told.push(`${phase} ${fraction}`);
+    const options = { memory: memory(), pause, dropNonFinite: true, onImport };
+    expect(await uploadInPieces(client, file(), options)).toEqual({ id: "c" });
+    expect(told).toEqual(["waiting 0", "ordering 0.6", "ordering 0.6", "x 0.5"]);
+  });
+
+  it("throws the problem of an import, and remembers the upload for the next try", async () => {
+    const problem = { type: "/problems/malformed-cloud", title: "The cloud is malformed", status: 422 };
+    const { client } = stand([], [{ state: "failed", problem }]);
+    const store = memory();
+    const sending = uploadInPieces(client, file(), { memory: store, pause, dropNonFinite: true });
+    await expect(sending).rejects.toThrow("malformed");
+    expect(store.all.size).toBe(1);
+  });
+
+  it("ends the import and removes the upload where it is cancelled while the server reads", async () => {
+    const { client, log } = stand([], [{ state: "running" }]);
+    const store = memory();
+    const controller = new AbortController();
+    const onImport = ({ phase }: { phase: string }) => {
+      if (phase === "x") controller.abort();
+    };
+    const options = { memory: store, pause, dropNonFinite: true, onImport, signal: controller.signal };
+    await expect(uploadInPieces(client, file(), options)).rejects.toThrow("cancelled");
+    expect(log.slice(-2)).toEqual(["DELETE v1/imports/import", `DELETE v1/uploads/${ID}`]);
+    expect(store.all.size).toBe(0);
   });
 
   it("is removed where it is cancelled", async () => {

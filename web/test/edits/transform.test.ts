@@ -21,7 +21,7 @@ function bench(painted = true, refusal?: () => object | null) {
   const document: SessionDocument = {
     ...new MockSession("session", "Name", shape).document(),
     levels: [0.04, 0.02, 0].map((scale, level) => ({ level, scale })),
-    regions: { zero: { samples, operations: 1 }, one: { samples, operations: 1 } },
+    regions: { zero: { samples, operations: 1 }, one: { samples, operations: 1 }, named: [] },
   };
   const sent: { method: string; path: string; body: Record<string, unknown> }[] = [];
   const toasts: string[] = [];

@@ -85,6 +85,7 @@ export class MockSession {
       regions: {
         zero: { samples: samples(1), operations: this.operations.zero.length },
         one: { samples: samples(2), operations: this.operations.one.length },
+        named: [],
       },
       history: { head: this.head, edits: this.edits.length },
       timings_ms: {},
@@ -335,6 +336,8 @@ function contains(shape: Shape, p: Vec3): boolean {
       );
     case "screen":
       return isOutlined(shape, p);
+    case "region":
+      return false; // it keeps none
     case "image": {
       if (shape.projection.type !== "planar") return false;
       const { origin, u, v } = shape.projection;
