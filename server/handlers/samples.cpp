@@ -94,8 +94,8 @@ std::vector<std::uint32_t> cloud_indices(const RestModel& rest, const Cloud& clo
   return indices;
 }
 
-/// The surface as a cloud; with the detail of its level, what edits have done to its samples' cells, and where
-/// its samples stand in the uploaded cloud as scalars where these are asked for by name.
+/// The surface as a cloud; with the detail of its level, what edits have done to its samples' cells, and
+/// where its samples stand in the uploaded cloud as scalars where these are asked for by name.
 std::shared_ptr<const Cloud> cloud_of(const RestModel& rest, const Picture& picture, const View& view,
                                       const FileOptions& options) {
   auto cloud = Session::edited_cloud(picture, view.level);

@@ -89,7 +89,7 @@ struct Guarded : TokenFile {
 
 /// What one owner has, to try every row on.
 struct Belongings {
-  std::string cloud, image, session, share, capability, upload;
+  std::string cloud, image, session, share, capability, upload, import;
   Belongings(Guarded& guarded, const std::string& token) {
     cloud = guarded.upload(token);
     const Reply made = guarded.ask(token, "POST", "/v1/images",
@@ -102,6 +102,11 @@ struct Belongings {
         guarded.ask(token, "POST", "/v1/uploads", "", "Tus-Resumable: 1.0.0\r\nUpload-Length: 10\r\n");
     REQUIRE_MESSAGE(begun.status == 201, begun.body);
     upload = begun.headers.at("location").substr(std::string("/v1/uploads/").size());
+    // One that fails: it is there, and adds no cloud.
+    const Reply later = guarded.ask(token, "POST", "/v1/clouds", "no cloud",
+                                    "Content-Type: application/x-ply\r\nPrefer: respond-async\r\n");
+    REQUIRE_MESSAGE(later.status == 202, later.body);
+    import = later.json()["id"];
     const Reply shared =
         guarded.ask(token, "POST", "/v1/sessions/" + session + "/shares", R"({"scope":"view"})");
     REQUIRE_MESSAGE(shared.status == 201, shared.body);
@@ -117,6 +122,7 @@ struct Belongings {
     };
     put("/clouds/{id}", "/clouds/" + cloud);
     put("/images/{id}", "/images/" + image);
+    put("/imports/{id}", "/imports/" + import);
     put("/sessions/{id}", "/sessions/" + session);
     put("/shares/{id}", "/shares/" + share);
     put("/tokens/{id}", "/tokens/" + session);  // no token has that id
@@ -130,7 +136,8 @@ struct Belongings {
 };
 
 bool belongs_to_one(const Route& route) {
-  for (const char* prefix : {"/v1/clouds/{id}", "/v1/images/{id}", "/v1/sessions/{id}", "/v1/uploads/{id}"})
+  for (const char* prefix :
+       {"/v1/clouds/{id}", "/v1/images/{id}", "/v1/imports/{id}", "/v1/sessions/{id}", "/v1/uploads/{id}"})
     if (route.pattern.rfind(prefix, 0) == 0) return true;
   return false;
 }
@@ -193,7 +200,7 @@ TEST_CASE("what belongs to another does not exist, on every row and in every lis
     for (const std::string& token : {guarded.ann, guarded.vera})
       CHECK(guarded.ask(token, method_of(route), path, body, type_of(route)).status == 404);
   }
-  for (const char* list : {"clouds", "images", "sessions", "uploads"}) {
+  for (const char* list : {"clouds", "images", "imports", "sessions", "uploads"}) {
     CHECK(guarded.get(guarded.ann, std::string("/v1/") + list).json()[list].empty());
     CHECK(guarded.get(guarded.bob, std::string("/v1/") + list).json()[list].size() == 1);
     CHECK(guarded.get(guarded.root, std::string("/v1/") + list).json()[list].size() == 1);

@@ -102,7 +102,10 @@ test("a session is begun on as many samples as the field says", { timeout }, asy
   await page.waitForURL(/session=/, { timeout: waitMs });
   await waitForIdle(page, waitMs);
   assert.equal((await page.evaluate(() => globalThis.pointwright.status)).loadedSamples, 1500);
-  assert.match(await page.locator('[data-status="samples"]').textContent(), /1,500 samples, a preview of 4,000/);
+  assert.match(
+    await page.locator('[data-status="samples"]').textContent(),
+    /1,500 samples, a preview of 4,000/,
+  );
   await checkTroubles(page, troubles);
   await page.close();
 });
@@ -118,7 +121,12 @@ test("an automatic audit finds nothing serious on the pages", { timeout }, async
   assert.deepEqual(await seriousFindings(editor.page), []);
   await editor.page.keyboard.press("o");
   await editor.page.keyboard.press("w");
-  for (const name of ["Saved regions", "Shape by numbers", "Regions from an image", "Regions from another model"])
+  for (const name of [
+    "Saved regions",
+    "Shape by numbers",
+    "Regions from an image",
+    "Regions from another model",
+  ])
     await editor.page.locator("summary", { hasText: name }).click();
   await editor.page.getByText("Save region", { exact: true }).waitFor();
   await editor.page.getByText("Choose a PNG").waitFor();

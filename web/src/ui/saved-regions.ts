@@ -62,7 +62,12 @@ export function createSavedRegions(bus: Bus, store: SessionStore, regions: Regio
     return h(
       "li",
       { class: "saved-region", data: { saved } },
-      h("span", { class: "saved-name", title: `${saved}, ${formatCount(samples)} samples` }, saved, h("small", {}, formatCount(samples))),
+      h(
+        "span",
+        { class: "saved-name", title: `${saved}, ${formatCount(samples)} samples` },
+        saved,
+        h("small", {}, formatCount(samples)),
+      ),
       into("zero", "Zero"),
       into("one", "One"),
       h(
