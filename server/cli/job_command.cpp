@@ -1,6 +1,5 @@
 #include "server/cli/job_command.h"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <chrono>

@@ -1,13 +1,10 @@
 #pragma once
 // `pointwright job run`: a recipe on a scan at full resolution, in this process.
 
+#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <iosfwd>
 #include <string>
-
-namespace CLI {
-class App;
-}
 
 namespace pointwright::server {
 

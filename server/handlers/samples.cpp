@@ -104,8 +104,8 @@ std::shared_ptr<const Cloud> cloud_of(const RestModel& rest, const Picture& pict
       std::pair{"anisotropy", &StretchColumns::anisotropy}, std::pair{"area_change", &StretchColumns::area}};
   const bool stretches =
       std::ranges::any_of(measures, [&](const auto& each) { return options.names(each.first); });
-  constexpr std::array<const char*, 3> axes{"stretch_x", "stretch_y", "stretch_z"};
-  const bool points = std::ranges::any_of(axes, [&](const char* name) { return options.names(name); });
+  constexpr std::array<const char*, 3> kAxes{"stretch_x", "stretch_y", "stretch_z"};
+  const bool points = std::ranges::any_of(kAxes, [&](const char* name) { return options.names(name); });
   if (!options.names("detail") && !options.names("cloud_index") && !stretches && !points) return cloud;
   Cloud with_scalars = *cloud;
   if (options.names("cloud_index")) put_scalar(with_scalars, "cloud_index", cloud_indices(rest, *cloud));
@@ -125,9 +125,9 @@ std::shared_ptr<const Cloud> cloud_of(const RestModel& rest, const Picture& pict
   if (points) {
     const Points direction = stretch_directions(*picture.samples->sampling);
     const std::array columns{direction.x(), direction.y(), direction.z()};
-    for (std::size_t axis = 0; axis < axes.size(); ++axis)
-      if (options.names(axes[axis]))
-        put_scalar(with_scalars, axes[axis],
+    for (std::size_t axis = 0; axis < kAxes.size(); ++axis)
+      if (options.names(kAxes[axis]))
+        put_scalar(with_scalars, kAxes[axis],
                    std::vector<float>(columns[axis], columns[axis] + direction.size()));
   }
   return std::make_shared<const Cloud>(std::move(with_scalars));

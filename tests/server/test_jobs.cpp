@@ -65,10 +65,10 @@ TEST_CASE(
   JobWorkshop workshop;
   const auto session = workshop.ready();
   edit_much(*session);
-  for (const auto& [s, timing] : {std::pair(1.0, Timing::kSequence), std::pair(0.6, Timing::kSequence),
-                                  std::pair(0.5, Timing::kTogether), std::pair(0.0, Timing::kSequence)}) {
-    CAPTURE(s);
-    const auto request = recipe_of(*session, s, timing);
+  for (const auto& how : {std::pair(1.0, Timing::kSequence), std::pair(0.6, Timing::kSequence),
+                          std::pair(0.5, Timing::kTogether), std::pair(0.0, Timing::kSequence)}) {
+    CAPTURE(how.first);
+    const auto request = recipe_of(*session, how.first, how.second);
     const auto other = workshop.ready();
     const auto applied = apply_recipe(*other, request, other->document()->revision);
     REQUIRE(applied.ok());
