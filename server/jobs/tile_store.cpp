@@ -58,14 +58,15 @@ std::string index_path(const std::string& folder) {
   return folder + "/samples.index";
 }
 
-/// The greatest distance to a k-th neighbour among probes all over the samples, which are in coherent order.
-float ring_width(const Points& position, std::uint32_t neighbors) {
-  if (position.size() < 2) return 0.0F;
+/// How far neighbourhoods reach, by probes all over the samples, which are in coherent order: a quarter more
+/// than all but a twentieth of them, so that strays far from everything do not widen it; at least `least`.
+float ring_width(const Points& position, std::uint32_t neighbors, float least) {
+  if (position.size() <= neighbors) return least;
   const BlockTree tree(position);
   const std::size_t blocks = (position.size() + kSimdBlock - 1) / kSimdBlock;
   const std::size_t step = std::max<std::size_t>(1, blocks / kProbes);
   std::vector<std::int32_t> rows;
-  float widest = 0.0F;
+  std::vector<float> reaches;
   for (std::size_t block = 0; block < blocks; block += step) {
     const std::size_t begin = block * kSimdBlock;
     const std::size_t end = std::min(begin + kSimdBlock, position.size());
@@ -74,12 +75,15 @@ float ring_width(const Points& position, std::uint32_t neighbors) {
       for (std::uint32_t j = neighbors; j-- > 0;) {
         const std::int32_t found = rows[j * kSimdBlock + i % kSimdBlock];
         if (found < 0) continue;
-        widest = std::max(widest, (position[i] - position[static_cast<std::size_t>(found)]).norm());
+        reaches.push_back((position[i] - position[static_cast<std::size_t>(found)]).norm());
         break;
       }
     }
   }
-  return widest;
+  if (reaches.empty()) return least;
+  const auto most = reaches.begin() + static_cast<std::ptrdiff_t>(reaches.size() * 19 / 20);
+  std::nth_element(reaches.begin(), most, reaches.end());
+  return std::max(least, 1.25F * *most);
 }
 
 Vec3f place_of(const TileSample& sample) {
@@ -210,7 +214,7 @@ Result<void> TileStore::read_samples(std::size_t tile, std::vector<TileSample>& 
 }
 
 Result<TileInput> TileStore::load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
-                                  bool has_normals) const {
+                                  float least_ring, bool has_normals) const {
   std::vector<TileSample> samples;
   if (auto read = read_samples(tile, samples); !read) return read.error();
   TileInput input;
@@ -224,7 +228,7 @@ Result<TileInput> TileStore::load(std::size_t tile, std::uint32_t rings, std::ui
   const std::vector<std::uint32_t> own_order = coherent_order(own);
   Points coherent(own.size());
   for (std::size_t i = 0; i < own.size(); ++i) coherent.set(i, own[own_order[i]]);
-  const float halo = static_cast<float>(rings) * ring_width(coherent, neighbors);
+  const float halo = static_cast<float>(rings) * ring_width(coherent, neighbors, least_ring);
   box.min.array() -= halo;
   box.max.array() += halo;
   std::vector<TileSample> others;

@@ -64,9 +64,9 @@ class TileStore {
   [[nodiscard]] std::uint64_t sample_count(std::size_t tile) const;
 
   /// The tile's samples and those of other tiles within `rings` neighbourhoods of `neighbors` samples around
-  /// them. Errors: kInvalidArgument (cannot be read)
+  /// them; a neighbourhood reaches at least as far as `least_ring`. Errors: kInvalidArgument (cannot be read)
   [[nodiscard]] Result<TileInput> load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
-                                       bool has_normals) const;
+                                       float least_ring, bool has_normals) const;
 
   [[nodiscard]] bool has_result(std::size_t tile) const;
   /// On the disk once it returns. Errors: those of write_file_atomically

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -197,6 +198,9 @@ class TiledJob {
 
   std::optional<Problem> edit_tiles() {
     const AnchorIndex anchors(played_.script.rest);
+    // Of an even scan of the typical spacing h: k samples in a disc of radius h sqrt(k / pi).
+    const double per_ring = std::sqrt((static_cast<double>(params_.neighbors) + 0.5) / std::numbers::pi);
+    const auto least_ring = static_cast<float>(report_.spacing * per_ring);
     std::uint64_t done = 0;
     for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
       progress_("tile " + std::to_string(tile + 1) + " of " + std::to_string(store_->tile_count()),
@@ -208,7 +212,7 @@ class TiledJob {
       }
       if (store_->sample_count(tile) == 0) continue;
       if (context_.is_cancelled()) return protocol::to_problem(cancelled_error());
-      auto input = store_->load(tile, rings_, params_.neighbors, records_.has_normals());
+      auto input = store_->load(tile, rings_, params_.neighbors, least_ring, records_.has_normals());
       if (!input) return protocol::to_problem(input.error());
       const std::shared_ptr<const Cloud> cloud = input.value().cloud;
       auto made = transfer_edits(played_.script, anchors, cloud, context_);

@@ -209,6 +209,27 @@ TEST_CASE("tiles leave no seam: many small ones and a single large one agree to 
   CHECK(bytes_of(job.out) == many);
 }
 
+TEST_CASE("strays far from everything leave the tiles of the others as they are") {
+  const JobFolder job;
+  Cloud sheet = wavy_sheet(200);
+  // One in a thousand stands somewhere in a space that is fifty times the sheet.
+  for (std::size_t i = 0; i < sheet.size(); i += 1000)
+    sheet.position.set(
+        i, Vec3f(std::fmod(static_cast<float>(i) * 0.37F, 50.0F), 3.0F, 0.001F * static_cast<float>(i)));
+  put(job.in, permuted(sheet, coherent_order(sheet.position)));
+  JobParams params = job.params();
+  params.request.recipe.level_scales = {0.11, 0.05, 0.0};
+  CHECK(job.run(params).tiles >= 8);
+  const Cloud many = cloud_of(job.out);
+  params.memory_bytes = std::uint64_t{1} << 30U;
+  CHECK(job.run(params).tiles == 1);
+  const Cloud one = cloud_of(job.out);
+  std::size_t same = 0;
+  for (std::size_t i = 0; i < one.size(); ++i)
+    if (many.position[i] == one.position[i]) ++same;
+  CHECK(static_cast<double>(same) > 0.999 * static_cast<double>(one.size()));
+}
+
 TEST_CASE("a job that was interrupted goes on from its tiles, and gives the bytes of one that was not") {
   const JobFolder job;
   put(job.in, wavy_sheet(200));
