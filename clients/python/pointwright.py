@@ -676,7 +676,10 @@ class Surface:
 
 
 class Client:
-    """A server. `url` and `token` default to $POINTWRIGHT_SERVER and $POINTWRIGHT_TOKEN.
+    """A server. `url`, `token` and `ca` default to $POINTWRIGHT_SERVER, $POINTWRIGHT_TOKEN and $POINTWRIGHT_CA.
+
+    The certificate and the host name of an https server are always verified: by the authorities in the file `ca` (PEM),
+    or by those that `requests` trusts where none is given.
 
     `retries` bounds how often a request is made again; `timeout` is that of connecting and of every silence of the
     server, in seconds."""
@@ -686,6 +689,7 @@ class Client:
         url: Optional[str] = None,
         token: Optional[str] = None,
         *,
+        ca: Optional[str] = None,
         retries: int = 5,
         timeout: float = 60.0,
         backoff: float = 0.5,
@@ -698,6 +702,11 @@ class Client:
         token = token if token is not None else os.environ.get("POINTWRIGHT_TOKEN")
         if token:
             self._http.headers["Authorization"] = f"Bearer {token}"
+        authorities = ca or os.environ.get("POINTWRIGHT_CA") or None
+        if authorities and not os.path.isfile(authorities):
+            raise ValueError(f"{authorities}: no file of authorities")
+        # With each request: one of the session's gives way to variables of the environment.
+        self._verify: Union[str, bool] = authorities or True
         self._info: Optional[Document] = None
 
     def __enter__(self) -> "Client":
@@ -740,8 +749,11 @@ class Client:
                 if callable(data):
                     body = data()
                 response = self._http.request(
-                    method, self.url + path, data=body, params=query, headers=sent, stream=stream, timeout=self.timeout
-                )
+                    method, self.url + path, data=body, params=query, headers=sent, stream=stream,
+                    timeout=self.timeout, verify=self._verify,
+                )  # fmt: skip
+            except requests.exceptions.SSLError as error:
+                raise Unreachable(f"{method} {self.url}{path}: {error}") from error
             except (requests.ConnectionError, requests.Timeout, requests.exceptions.ChunkedEncodingError) as error:
                 if last or not self._may_repeat(method, error):
                     raise Unreachable(f"{method} {self.url}{path}: {error}") from error

@@ -65,16 +65,19 @@ std::vector<Assignment> environment_assignments(const std::vector<Setting>& sett
 }
 
 void check_whole(const Config& config) {
+  if (config.tls_cert.empty() != config.tls_key.empty())
+    throw std::invalid_argument(config.tls_key.empty() ? "tls_cert is given without tls_key"
+                                                       : "tls_key is given without tls_cert");
   if (is_loopback(config.host)) return;
   const std::string host = std::string("host ").append(config.host).append(" is not a loopback address; ");
   if (token_file(config).empty())
     throw std::invalid_argument(host +
                                 "beyond loopback callers need tokens: --tokens FILE (see pointwrightd "
                                 "token add)");
-  if (!config.behind_proxy && !config.allow_remote)
+  if (config.tls_cert.empty() && !config.behind_proxy && !config.allow_remote)
     throw std::invalid_argument(host +
-                                "beyond loopback tokens need TLS: --behind-proxy says that a reverse "
-                                "proxy does it");
+                                "beyond loopback tokens need TLS: --tls-cert and --tls-key, or a reverse "
+                                "proxy that does it (--behind-proxy)");
 }
 
 void apply_assignments(const std::vector<Assignment>& assignments, Config& config, SettingSources& sources) {

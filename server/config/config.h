@@ -29,6 +29,8 @@ struct Config {
   std::vector<std::string> cors_origins;   ///< whose pages may use the API
   std::string data;                        ///< the folder for what outlives the daemon; empty: nothing does
   std::string tokens;                      ///< the file of tokens; empty: <data>/tokens.json where that is
+  std::string tls_cert;                    ///< the chain of certificates, PEM; empty: without TLS
+  std::string tls_key;                     ///< its key, PEM
   std::string web_root;                    ///< the viewer's files; empty: none are served
   std::vector<SampleFile> samples;
   std::string log_level = "info";  ///< trace, debug, info, warn, error or off
@@ -65,7 +67,7 @@ std::string to_toml(const Config& config);
 /// The file of tokens that is in use; empty where none is.
 std::string token_file(const Config& config);
 
-/// A loopback address: what may be bound without allow_remote.
+/// A loopback address: what may be bound without tokens and TLS.
 bool is_loopback(const std::string& host);
 
 }  // namespace pointwright::server

@@ -190,6 +190,12 @@ std::vector<Setting> all_settings() {
           "tokens", &Config::tokens,
           "file of tokens (mode 0600); where it is not given, tokens.json of the data folder if it is "
           "there"),
+      text_setting(
+          "tls_cert", &Config::tls_cert,
+          "file with the server's certificate and those between it and its authority (PEM): the daemon "
+          "then speaks TLS alone"),
+      text_setting("tls_key", &Config::tls_key,
+                   "file with the certificate's key (PEM, without a passphrase)"),
       text_setting("web", &Config::web_root,
                    "folder with the viewer's files; none are served where it is not given"),
       samples_setting(),

@@ -6,7 +6,6 @@
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/uio.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,6 +14,8 @@
 #include <thread>
 #include <vector>
 
+#include "server/http/tls.h"
+
 namespace pointwright::server {
 namespace {
 
@@ -22,22 +23,10 @@ constexpr std::size_t kLingerDropBytes = 256 * 1024;
 constexpr std::size_t kReadBytes = 64 * 1024;
 constexpr std::size_t kPieceBytes = 256 * 1024;
 constexpr std::uint64_t kHoldBytes = 4U << 20U;
-constexpr std::size_t kMostPieces = 4;  // in one call
 
 int poll_timeout(Clock::time_point deadline) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
   return static_cast<int>(std::clamp<long long>(left, 0, 60'000));
-}
-
-/// Waits for events; false at the deadline.
-bool wait_for(int descriptor, short events, Clock::time_point deadline) {
-  while (true) {
-    pollfd entry{.fd = descriptor, .events = events, .revents = 0};
-    const int ready = ::poll(&entry, 1, poll_timeout(deadline));
-    if (ready > 0) return true;
-    if (ready < 0 && errno != EINTR) return true;  // let the call itself report what is wrong
-    if (Clock::now() >= deadline) return false;
-  }
 }
 
 /// What came buys time at the least rate, but never more than the grace: nobody saves up for a pause.
@@ -58,29 +47,41 @@ std::span<std::span<const std::byte>> past(std::span<std::span<const std::byte>>
 
 }  // namespace
 
-Connection::Connection(int descriptor) : descriptor_(descriptor) {
-  // The library accepts without these: children must not inherit the socket, small answers must not wait.
-  ::fcntl(descriptor_, F_SETFD, FD_CLOEXEC);
-  ::fcntl(descriptor_, F_SETFL, ::fcntl(descriptor_, F_GETFL) | O_NONBLOCK);
-  const int on = 1;
-  ::setsockopt(descriptor_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+Connection::OwnDescriptor::~OwnDescriptor() {
+  ::close(number_);
 }
 
-Connection::~Connection() {
-  ::close(descriptor_);
+Connection::Connection(int descriptor, const TlsIdentity* tls)
+    : descriptor_(descriptor),
+      transport_(tls == nullptr ? plain_transport(descriptor) : tls->accept(descriptor)) {
+  // The library accepts without these: children must not inherit the socket, small answers must not wait.
+  ::fcntl(descriptor, F_SETFD, FD_CLOEXEC);
+  ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) | O_NONBLOCK);
+  const int on = 1;
+  ::setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+}
+
+bool Connection::wait_for(Moved::Status status, Clock::time_point deadline) const {
+  const bool reads = status == Moved::Status::kWantRead;
+  if (!reads && status != Moved::Status::kWantWrite) return false;
+  // At every attempt: bytes that complete nothing do not extend the deadline.
+  while (Clock::now() < deadline) {
+    pollfd entry{
+        .fd = descriptor_.get(), .events = static_cast<short>(reads ? POLLIN : POLLOUT), .revents = 0};
+    const int ready = ::poll(&entry, 1, poll_timeout(deadline));
+    if (ready > 0) return true;
+    if (ready < 0 && errno != EINTR) return true;  // let the call itself report what is wrong
+  }
+  return false;
 }
 
 std::ptrdiff_t Connection::receive(char* data, std::size_t size, Clock::time_point deadline) {
   while (true) {
-    const ssize_t count = ::recv(descriptor_, data, size, 0);
-    if (count > 0) return count;
-    if (count == 0) return 0;
-    if (errno == EINTR) continue;
-    if (errno != EAGAIN && errno != EWOULDBLOCK) {
-      broken_ = true;
-      return 0;
-    }
-    if (!wait_for(descriptor_, POLLIN, deadline)) return -1;
+    const Moved moved = transport_->read(std::span(data, size));
+    if (moved.status == Moved::Status::kDone) return static_cast<std::ptrdiff_t>(moved.count);
+    if (moved.status == Moved::Status::kBroken) broken_ = true;
+    if (moved.status == Moved::Status::kEnded || broken_) return 0;
+    if (!wait_for(moved.status, deadline)) return -1;
   }
 }
 
@@ -167,25 +168,14 @@ bool Connection::write_all(std::span<const std::byte> bytes, Clock::time_point d
 
 bool Connection::write_all(std::span<std::span<const std::byte>> pieces, Clock::time_point deadline) {
   for (pieces = past(pieces, 0); !pieces.empty() && !broken_;) {
-    std::array<iovec, kMostPieces> vectors{};
-    const std::size_t several = std::min(pieces.size(), kMostPieces);
-    for (std::size_t i = 0; i < several; ++i) {
-      // The kernel only reads through it.
-      vectors[i] = {.iov_base = const_cast<std::byte*>(pieces[i].data()), .iov_len = pieces[i].size()};
-    }
-    msghdr message{};
-    message.msg_iov = vectors.data();
-    message.msg_iovlen = several;
-    const ssize_t count = ::sendmsg(descriptor_, &message, MSG_NOSIGNAL);
-    if (count >= 0) {
-      pieces = past(pieces, static_cast<std::size_t>(count));
+    const Moved moved = transport_->write(pieces);
+    if (moved.status == Moved::Status::kDone) {
+      pieces = past(pieces, moved.count);
       // A reader that takes a byte at a time must not push the deadline ahead of itself.
       if (!pieces.empty() && Clock::now() >= deadline) broken_ = true;
-      continue;
-    }
-    if (errno == EINTR) continue;
-    if ((errno != EAGAIN && errno != EWOULDBLOCK) || !wait_for(descriptor_, POLLOUT, deadline))
+    } else if (!wait_for(moved.status, deadline)) {
       broken_ = true;
+    }
   }
   return !broken_;
 }
@@ -198,7 +188,7 @@ std::string Connection::peer_address() const {
   sockaddr_storage address{};
   socklen_t size = sizeof address;
   std::array<char, INET6_ADDRSTRLEN> text{};
-  if (::getpeername(descriptor_, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
+  if (::getpeername(descriptor_.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
   const void* number = nullptr;
   if (address.ss_family == AF_INET) number = &reinterpret_cast<const sockaddr_in*>(&address)->sin_addr;
   if (address.ss_family == AF_INET6) number = &reinterpret_cast<const sockaddr_in6*>(&address)->sin6_addr;
@@ -208,15 +198,14 @@ std::string Connection::peer_address() const {
 }
 
 bool Connection::is_peer_gone() const {
-  if (broken_) return true;
-  pollfd entry{.fd = descriptor_, .events = POLLRDHUP, .revents = 0};
-  return ::poll(&entry, 1, 0) > 0 && (entry.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
+  return broken_ || transport_->is_peer_gone();
 }
 
 void Connection::linger(std::chrono::milliseconds patience) {
   if (broken_) return;
-  ::shutdown(descriptor_, SHUT_WR);
   const Clock::time_point deadline = Clock::now() + patience;
+  while (wait_for(transport_->end().status, deadline)) {
+  }
   std::array<char, 16 * 1024> chunk;
   std::size_t dropped = 0;
   while (Clock::now() < deadline) {

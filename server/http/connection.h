@@ -5,19 +5,25 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+
+#include "server/http/transport.h"
 
 namespace pointwright::server {
 
 using Clock = std::chrono::steady_clock;
 
+class TlsIdentity;
+
 /// Owns the descriptor; used by one thread at a time.
 class Connection {
  public:
-  explicit Connection(int descriptor);
-  ~Connection();
+  /// Where there is an identity the bytes go through TLS; its handshake is within the deadline of the head.
+  explicit Connection(int descriptor, const TlsIdentity* tls = nullptr);
+  ~Connection() = default;
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
@@ -63,7 +69,23 @@ class Connection {
   /// recv within the deadline. > 0: bytes; 0: closed or broken; -1: timed out.
   std::ptrdiff_t receive(char* data, std::size_t size, Clock::time_point deadline);
 
-  int descriptor_;
+  /// Waits for what a transport's attempt wants. False where it cannot go on: broken, ended or at the
+  /// deadline.
+  bool wait_for(Moved::Status status, Clock::time_point deadline) const;
+
+  class OwnDescriptor {
+   public:
+    explicit OwnDescriptor(int descriptor) : number_(descriptor) {}
+    ~OwnDescriptor();
+    OwnDescriptor(const OwnDescriptor&) = delete;
+    OwnDescriptor& operator=(const OwnDescriptor&) = delete;
+    [[nodiscard]] int get() const { return number_; }
+
+   private:
+    int number_;
+  };
+  OwnDescriptor descriptor_;
+  std::unique_ptr<Transport> transport_;
   std::string pending_;  // read beyond the head, not yet handed out
   bool broken_ = false;
 };

@@ -196,7 +196,8 @@ Response Exchange::dispatch() {
   if (context_.stopping)
     return refuse({.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"});
   auto& head = std::get<RequestHead>(head_);
-  if (auto problem = check_origin(head, context_.options.allowed_hosts, context_.options.cors_origins))
+  if (auto problem = check_origin(head, context_.options.allowed_hosts, context_.options.cors_origins,
+                                  context_.options.tls != nullptr))
     return refuse(*problem);
   if (is_preflight(head)) return preflight(head, context_.options.cors_origins);
   Resolution resolution = context_.resolver(head, request_id_);
@@ -251,6 +252,9 @@ Response Exchange::answer() {
     if (head->path.starts_with("/v1/uploads") && !has_header(response, "Tus-Resumable"))
       response.with_header("Tus-Resumable", "1.0.0");
     allow_reading(response, *head, context_.options.cors_origins);
+    // Not for loopback names: browsers would want TLS of whatever else listens there.
+    if (context_.options.tls != nullptr && !is_loopback_name(head->header("host").value_or("localhost")))
+      response.with_header("Strict-Transport-Security", "max-age=31536000");
   }
   if (!has_header(response, "Cache-Control")) response.with_header("Cache-Control", "no-store");
   return response;

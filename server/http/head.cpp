@@ -170,6 +170,24 @@ int hex_value(char c) {
   return -1;
 }
 
+/// The name of a host without its port, in lower case; empty where it is none.
+std::string host_name(std::string_view host) {
+  std::string name = lower(host);
+  if (!name.empty() && name.front() == '[') {
+    const std::size_t close = name.find(']');
+    if (close == std::string::npos) return {};
+    const std::string port = name.substr(close + 1);
+    if (!port.empty() && port.front() != ':') return {};
+    name.resize(close + 1);
+  } else if (const std::size_t colon = name.find(':'); colon != std::string::npos) {
+    const bool digits = std::all_of(name.begin() + static_cast<std::ptrdiff_t>(colon) + 1, name.end(),
+                                    [](char c) { return c >= '0' && c <= '9'; });
+    if (!digits) return {};
+    name.resize(colon);
+  }
+  return name;
+}
+
 }  // namespace
 
 std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space) {
@@ -212,26 +230,19 @@ std::variant<RequestHead, Problem> parse_head(std::string_view bytes, const Head
   return head;
 }
 
+bool is_loopback_name(std::string_view host) {
+  const std::string name = host_name(host);
+  return name == "localhost" || name == "127.0.0.1" || name == "[::1]";
+}
+
 bool is_allowed_host(std::string_view host, const std::vector<std::string>& allowed_hosts) {
-  std::string name = lower(host);
-  if (!name.empty() && name.front() == '[') {
-    const std::size_t close = name.find(']');
-    if (close == std::string::npos) return false;
-    const std::string port = name.substr(close + 1);
-    if (!port.empty() && port.front() != ':') return false;
-    name.resize(close + 1);
-  } else if (const std::size_t colon = name.find(':'); colon != std::string::npos) {
-    const bool digits = std::all_of(name.begin() + static_cast<std::ptrdiff_t>(colon) + 1, name.end(),
-                                    [](char c) { return c >= '0' && c <= '9'; });
-    if (!digits) return false;
-    name.resize(colon);
-  }
-  if (name == "localhost" || name == "127.0.0.1" || name == "[::1]") return true;
-  return std::find(allowed_hosts.begin(), allowed_hosts.end(), name) != allowed_hosts.end();
+  const std::string name = host_name(host);
+  return is_loopback_name(name) || (!name.empty() && std::find(allowed_hosts.begin(), allowed_hosts.end(),
+                                                               name) != allowed_hosts.end());
 }
 
 std::optional<Problem> check_origin(const RequestHead& head, const std::vector<std::string>& allowed_hosts,
-                                    const std::vector<std::string>& cors_origins) {
+                                    const std::vector<std::string>& cors_origins, bool is_tls) {
   const std::string host = lower(head.header("host").value_or(""));
   if (!is_allowed_host(host, allowed_hosts))
     return Problem{
@@ -242,7 +253,8 @@ std::optional<Problem> check_origin(const RequestHead& head, const std::vector<s
     if (entry.first != "origin") continue;
     const std::string origin = lower(entry.second);
     const bool is_listed = std::find(cors_origins.begin(), cors_origins.end(), origin) != cors_origins.end();
-    if (!is_listed && origin != "http://" + host && origin != "https://" + host)
+    const bool is_own = origin == "https://" + host || (!is_tls && origin == "http://" + host);
+    if (!is_listed && !is_own)
       return Problem{.kind = ProblemKind::kOriginNotAllowed,
                      .detail = "changes are taken from this server's own pages only"};
   }

@@ -35,9 +35,12 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
 /// listed.
 bool is_allowed_host(std::string_view host, const std::vector<std::string>& allowed_hosts);
 
+/// Whether the host is a loopback name, with or without port.
+bool is_loopback_name(std::string_view host);
+
 /// Host allow-list on every request; Origin absent, the request's own host or one of the listed origins on
-/// state changes (403 otherwise).
+/// state changes (403 otherwise). `is_tls`: pages without TLS are then not our own.
 std::optional<Problem> check_origin(const RequestHead& head, const std::vector<std::string>& allowed_hosts,
-                                    const std::vector<std::string>& cors_origins = {});
+                                    const std::vector<std::string>& cors_origins = {}, bool is_tls = false);
 
 }  // namespace pointwright::server

@@ -230,7 +230,7 @@ class HttpServer::Fence final : public httplib::Server {
  private:
   bool process_and_close_socket(socket_t socket) override {
     try {
-      Connection connection(socket);
+      Connection connection(socket, context_.options.tls.get());
       serve(connection);
       connection.linger(refuses_connection ? std::chrono::milliseconds(100) : kLingerPatience);
     } catch (...) {

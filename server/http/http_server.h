@@ -16,6 +16,8 @@
 
 namespace pointwright::server {
 
+class TlsIdentity;
+
 struct HttpOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = 0;  ///< 0: any free one
@@ -30,6 +32,7 @@ struct HttpOptions {
   std::uint64_t least_write_rate = 64 * 1024;
   std::chrono::milliseconds stream_write_deadline{20'000};  ///< for each write of a streamed body
   std::size_t max_connections = 1024;
+  std::shared_ptr<const TlsIdentity> tls;  ///< null: without TLS
 };
 
 /// One finished request, for the log.

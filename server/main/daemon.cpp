@@ -14,6 +14,7 @@
 #include "server/base/sha256.h"
 #include "server/handlers/service.h"
 #include "server/http/http_server.h"
+#include "server/http/tls.h"
 #include "server/ingest/files.h"
 #include "server/log/log.h"
 #include "server/routes/routes.h"
@@ -21,7 +22,7 @@
 namespace pointwright::server {
 namespace {
 
-HttpOptions http_options(const Config& config) {
+HttpOptions http_options(const Config& config, std::shared_ptr<const TlsIdentity> tls) {
   const Limits& limits = config.limits;
   const auto ms = [](std::uint64_t value) { return std::chrono::milliseconds(value); };
   return {.host = config.host,
@@ -35,7 +36,8 @@ HttpOptions http_options(const Config& config) {
           .body_grace = ms(limits.body_grace_ms),
           .least_body_rate = limits.least_body_rate,
           .stream_write_deadline = ms(limits.stream_write_deadline_ms),
-          .max_connections = static_cast<std::size_t>(limits.max_connections)};
+          .max_connections = static_cast<std::size_t>(limits.max_connections),
+          .tls = std::move(tls)};
 }
 
 /// Connections need descriptors; the usual soft limit of 1024 is below what we are configured to serve.
@@ -85,15 +87,28 @@ std::optional<std::string> write_port_file(const std::string& path, std::uint16_
   return written ? std::nullopt : std::optional<std::string>(written.error().message);
 }
 
-/// Reads the tokens again and opens the log again, as often as that is asked for (SIGHUP; SIGUSR1: the log
-/// alone), until the daemon is to end. Returns the signal that said so.
-int wait_for_end(const sigset_t& signals, Service& service, Log& log) {
+/// The certificate of the settings; null where they name none. Throws std::runtime_error.
+std::shared_ptr<TlsIdentity> tls_identity(const Config& config, Log& log) {
+  if (config.tls_cert.empty()) return nullptr;
+  auto tls = std::make_shared<TlsIdentity>(config.tls_cert, config.tls_key);
+  if (auto problem = tls->reload()) throw std::runtime_error(*problem);
+  log.write(LogLevel::kInfo, "certificate", {{"file", config.tls_cert}, {"valid_until", tls->valid_until()}});
+  return tls;
+}
+
+/// Reads tokens and certificate again and opens the log again, as often as that is asked for (SIGHUP;
+/// SIGUSR1: the log alone), until the daemon is to end. Returns the signal that said so.
+int wait_for_end(const sigset_t& signals, Service& service, TlsIdentity* tls, Log& log) {
   while (true) {
     int signal = 0;
     if (::sigwait(&signals, &signal) != 0) continue;
     if (signal != SIGHUP && signal != SIGUSR1) return signal;
     if (auto problem = log.reopen()) log.write(LogLevel::kError, "reopen-failed", {{"message", *problem}});
     if (signal == SIGUSR1) continue;
+    if (auto problem = tls == nullptr ? std::nullopt : tls->reload())
+      log.write(LogLevel::kError, "reload-failed", {{"message", *problem + "; the old certificate stays"}});
+    else if (tls != nullptr)
+      log.write(LogLevel::kInfo, "reloaded", {{"valid_until", tls->valid_until()}});
     if (auto problem = service.access.tokens.reload()) {
       log.write(LogLevel::kError, "reload-failed", {{"message", *problem}});
     } else {
@@ -148,6 +163,7 @@ int run_daemon(const Config& config) {
     for (const std::string& name : config.unknown_variables)
       log.write(LogLevel::kWarn, "unknown-variable", {{"name", name}});
     raise_descriptor_limit(config, log);
+    const std::shared_ptr<TlsIdentity> tls = tls_identity(config, log);
     const auto decoders = std::make_shared<DecodeSlots>(static_cast<int>(config.limits.max_decoders));
     Service service(config,
                     {.decode = logged(confined_decoder(decoders), log, "cloud"),
@@ -162,7 +178,7 @@ int run_daemon(const Config& config) {
                      .decode_file = confined_file_decoder(decoders),
                      .routes = route_names()});
     HttpServer server(
-        http_options(config),
+        http_options(config, tls),
         [&service](const RequestHead& head, const std::string& id) { return resolve(service, head, id); },
         [&log, &service](const RequestLog& request) {
           service.metrics.count_request(request);
@@ -188,10 +204,11 @@ int run_daemon(const Config& config) {
                {"port", server.port()},
                {"pid", ::getpid()}});
     const bool is_ipv6 = config.host.find(':') != std::string::npos;
-    std::cout << "pointwrightd listens on http://" << (is_ipv6 ? "[" + config.host + "]" : config.host) << ":"
-              << server.port() << "/" << std::endl;
+    std::cout << "pointwrightd listens on " << (tls == nullptr ? "http" : "https") << "://"
+              << (is_ipv6 ? "[" + config.host + "]" : config.host) << ":" << server.port() << "/"
+              << std::endl;
 
-    const int signal = wait_for_end(signals, service, log);
+    const int signal = wait_for_end(signals, service, tls.get(), log);
     // From here on a further signal ends the process as it always would.
     for (const int each : {SIGTERM, SIGINT}) std::signal(each, SIG_DFL);
     sigset_t ending;

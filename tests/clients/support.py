@@ -34,7 +34,8 @@ class Daemon:
             if self.process.poll() is not None or time.monotonic() > ends:
                 raise RuntimeError("the daemon does not start: " + pathlib.Path(self.folder, "log").read_text())
             time.sleep(0.01)
-        self.url = f"http://127.0.0.1:{port_file.read_text().strip()}"
+        scheme = "https" if "--tls-cert" in arguments else "http"
+        self.url = f"{scheme}://127.0.0.1:{port_file.read_text().strip()}"
 
     def stop(self):
         if self.process.poll() is None:
@@ -46,6 +47,18 @@ class Daemon:
                 self.process.wait()
         self.log.close()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def certificate(folder, name):
+    """A key and a certificate signed by it, for localhost and 127.0.0.1: the files' paths."""
+    made = pathlib.Path(folder, f"{name}.pem"), pathlib.Path(folder, f"{name}.key")
+    subprocess.run(
+        ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1",
+         "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1",
+         "-out", str(made[0]), "-keyout", str(made[1])],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    return str(made[0]), str(made[1])
 
 
 def sheet(side):

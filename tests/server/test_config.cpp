@@ -143,6 +143,14 @@ TEST_CASE("an address beyond loopback must be asked for") {
   CHECK(refusal(read({"--host", "0.0.0.0", "--tokens", "t"})).find("--behind-proxy") != std::string::npos);
   CHECK(good(read({"--host", "0.0.0.0", "--tokens", "t", "--allow-remote"})).allow_remote);
   CHECK(good(read({"--host", "0.0.0.0", "--tokens", "t", "--behind-proxy"})).behind_proxy);
+  CHECK(refusal(read({"--host", "0.0.0.0", "--tokens", "t"})).find("--tls-cert") != std::string::npos);
+  const std::vector<std::string> tls = {"--host", "0.0.0.0", "--tls-cert", "c.pem", "--tls-key", "k.pem"};
+  CHECK(refusal(read(tls)).find("--tokens") != std::string::npos);
+  std::vector<std::string> with_tokens = tls;
+  with_tokens.insert(with_tokens.end(), {"--tokens", "t"});
+  CHECK(good(read(with_tokens)).tls_key == "k.pem");
+  CHECK(refusal(read({"--tls-cert", "c.pem"})).find("tls_key") != std::string::npos);
+  CHECK(refusal(read({}, {{"POINTWRIGHT_TLS_KEY", "k.pem"}})).find("tls_cert") != std::string::npos);
   CHECK(good(read({"--host", "127.0.0.2"})).host == "127.0.0.2");
   CHECK_FALSE(is_loopback("127.0.0.1.example.org"));
 }

@@ -126,4 +126,11 @@ TEST_CASE("changes are taken from no origin or the request's own") {
   for (const char* origin : {"null", "http://evil.example", "http://localhost", "http://localhost:78780"})
     for (const char* method : {"POST", "PUT", "DELETE"}) CHECK_MESSAGE(kind(method, origin) == 403, origin);
   CHECK(kind("GET", "http://evil.example") == 200);
+  // Where the server itself does TLS, a page without it is somebody else's.
+  const auto over_tls = [](const std::string& origin) {
+    const std::string text = "DELETE / HTTP/1.1\r\nHost: scan.example\r\nOrigin: " + origin + "\r\n\r\n";
+    return check_origin(parsed(text), {"scan.example"}, {}, true).has_value();
+  };
+  CHECK_FALSE(over_tls("https://scan.example"));
+  CHECK(over_tls("http://scan.example"));
 }

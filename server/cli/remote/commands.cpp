@@ -29,6 +29,18 @@ std::string token_of(const RemoteConnection& connection) {
   return token;
 }
 
+/// The file of --ca or, for https alone, of the environment; empty: the system's authorities.
+std::string ca_of(const RemoteConnection& connection) {
+  const bool is_tls = connection.url.rfind("https://", 0) == 0;
+  if (!is_tls && !connection.ca.empty())
+    throw CommandFailure{.code = ExitCode::kUsage, .text = "--ca: the server's URL is not https://…"};
+  std::string file = connection.ca.empty() && is_tls ? environment("POINTWRIGHT_CA") : connection.ca;
+  if (!file.empty() && !std::ifstream(file))
+    throw CommandFailure{.code = ExitCode::kUsage,
+                         .text = std::string("--ca: ").append(file).append(" cannot be read")};
+  return file;
+}
+
 /// Tests make the pauses short.
 Retries retries_of() {
   Retries retries;
@@ -67,6 +79,9 @@ void RemoteCommands::add_connection(CLI::App& command) {
   command.add_option("--server", connection_->url, "its URL; $POINTWRIGHT_SERVER")->capture_default_str();
   command.add_option("--token", connection_->token, "to be let in with; $POINTWRIGHT_TOKEN");
   command.add_option("--token-file", connection_->token_file, "a file that holds the token");
+  command.add_option("--ca", connection_->ca,
+                     "a file of authorities that vouch for an https server (PEM), instead of the system's; "
+                     "$POINTWRIGHT_CA");
   command.add_flag("--json", connection_->json, "print the server's document");
 }
 
@@ -89,7 +104,7 @@ std::optional<int> RemoteCommands::run(std::ostream& out, std::ostream& err) con
       std::find_if(actions_.begin(), actions_.end(), [](const auto& entry) { return entry.first->parsed(); });
   if (chosen == actions_.end()) return std::nullopt;
   try {
-    const RemoteService service(connection_->url, token_of(*connection_), retries_of());
+    const RemoteService service(connection_->url, token_of(*connection_), ca_of(*connection_), retries_of());
     chosen->second({.service = service, .out = out, .err = err, .json = connection_->json});
     return static_cast<int>(ExitCode::kDone);
   } catch (const CommandFailure& failure) {

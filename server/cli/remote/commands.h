@@ -20,6 +20,7 @@ struct RemoteConnection {
   std::string url = {};
   std::string token = {};
   std::string token_file = {};
+  std::string ca = {};
   bool json = false;
 };
 
@@ -46,7 +47,7 @@ class RemoteCommands {
   /// Runs the command that was parsed; nullopt where none of these was.
   std::optional<int> run(std::ostream& out, std::ostream& err) const;
 
-  /// Adds --server, --token, --token-file and --json.
+  /// Adds --server, --token, --token-file, --ca and --json.
   void add_connection(CLI::App& command);
 
  private:

@@ -83,7 +83,8 @@ std::string HttpAnswer::header(const std::string& name) const {
   return found == headers.end() ? std::string() : found->second;
 }
 
-HttpClient::HttpClient(const std::string& url, std::string token) : url_(url), token_(std::move(token)) {
+HttpClient::HttpClient(const std::string& url, std::string token, std::string ca)
+    : url_(url), token_(std::move(token)), ca_(std::move(ca)) {
   while (!url_.empty() && url_.back() == '/') url_.pop_back();
   const std::size_t scheme = url_.find("://");
   if (scheme == std::string::npos) return;
@@ -112,6 +113,11 @@ HttpAnswer HttpClient::send(const HttpRequest& request) const {
   if (!client.is_valid()) {
     answer.trouble = "the server's address is not valid";
     return answer;
+  }
+  if (is_tls()) {
+    client.enable_server_certificate_verification(true);
+    if (!ca_.empty()) client.set_ca_cert_path(ca_);
+    SSL_CTX_set_min_proto_version(client.ssl_context(), TLS1_2_VERSION);
   }
   client.set_connection_timeout(kConnectSeconds);
   client.set_read_timeout(kSilenceSeconds);

@@ -37,11 +37,14 @@ struct HttpRequest {
 
 class HttpClient {
  public:
-  /// `url` is http://host[:port][/path] or https://…; a token is sent as a bearer's.
-  HttpClient(const std::string& url, std::string token);
+  /// `url` is http://host[:port][/path] or https://…; a token is sent as a bearer's. A server's certificate
+  /// and host name are always verified: by the authorities in the file `ca` (PEM), or by the system's where
+  /// it is empty.
+  HttpClient(const std::string& url, std::string token, std::string ca = {});
 
   /// Whether the URL is one.
   [[nodiscard]] bool is_valid() const { return !origin_.empty(); }
+  [[nodiscard]] bool is_tls() const { return origin_.rfind("https:", 0) == 0; }
   [[nodiscard]] const std::string& url() const { return url_; }
   /// The path of a Location or of a URL, below the server's own.
   [[nodiscard]] std::string path_of(const std::string& location) const;
@@ -52,6 +55,7 @@ class HttpClient {
   std::string origin_;
   std::string base_;
   std::string token_;
+  std::string ca_;
 };
 
 /// Percent-encodes all but letters, digits, '-', '.', '_' and '~'.

@@ -70,8 +70,8 @@ json document_of(const HttpAnswer& answer) {
   return document;
 }
 
-RemoteService::RemoteService(const std::string& url, std::string token, Retries retries)
-    : http_(url, std::move(token)), retries_(retries) {
+RemoteService::RemoteService(const std::string& url, std::string token, std::string ca, Retries retries)
+    : http_(url, std::move(token), std::move(ca)), retries_(retries) {
   if (!http_.is_valid())
     throw CommandFailure{.code = ExitCode::kUsage, .text = "--server: not http://host:port or https://…"};
 }

@@ -35,7 +35,7 @@ struct Retries {
 
 class RemoteService {
  public:
-  RemoteService(const std::string& url, std::string token, Retries retries);
+  RemoteService(const std::string& url, std::string token, std::string ca, Retries retries);
 
   [[nodiscard]] const HttpClient& http() const { return http_; }
   [[nodiscard]] const Retries& retries() const { return retries_; }

@@ -1,0 +1,45 @@
+"""The Python client over TLS: whom it trusts, and whom it does not."""
+
+import os
+import pathlib
+import tempfile
+import unittest
+import unittest.mock
+
+import support
+from pointwright import Client, Unreachable
+
+
+class OverTls(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.ca, key = support.certificate(folder.name, "own")
+        self.other, _ = support.certificate(folder.name, "other")
+        self.daemon = support.Daemon("--tls-cert", self.ca, "--tls-key", key)
+        self.addCleanup(self.daemon.stop)
+
+    def test_a_whole_edit_by_a_file_of_authorities(self):
+        path = pathlib.Path(self.folder, "sheet.ply")
+        path.write_bytes(support.ply(support.sheet(20)))
+        # A variable that others read does not take its place.
+        with unittest.mock.patch.dict(os.environ, {"REQUESTS_CA_BUNDLE": self.other}):
+            with Client(self.daemon.url, ca=self.ca) as client:
+                session = client.upload(path).open_session(scales=[0.05])
+                session.download(path)
+        self.assertEqual(len(support.read_ply(path)), 400)
+        with unittest.mock.patch.dict(os.environ, {"POINTWRIGHT_CA": self.ca}):
+            Client(self.daemon.url).info()
+
+    def test_strangers_and_other_names_are_refused_at_once(self):
+        for url, ca in ((self.daemon.url, None), (self.daemon.url, self.other),
+                        (self.daemon.url.replace("127.0.0.1", "127.0.0.2"), self.ca)):  # fmt: skip
+            with self.assertRaisesRegex(Unreachable, "(?i)certificate"):
+                Client(url, ca=ca, backoff=60).info()
+        with self.assertRaises(ValueError):
+            Client(self.daemon.url, ca="/nonexistent")
+
+
+if __name__ == "__main__":
+    unittest.main()
