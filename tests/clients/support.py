@@ -49,12 +49,12 @@ class Daemon:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def certificate(folder, name):
-    """A key and a certificate signed by it, for localhost and 127.0.0.1: the files' paths."""
+def certificate(folder, name, names="DNS:localhost,IP:127.0.0.1"):
+    """A key and a certificate signed by it, for the names: the files' paths."""
     made = pathlib.Path(folder, f"{name}.pem"), pathlib.Path(folder, f"{name}.key")
     subprocess.run(
         ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1",
-         "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1",
+         "-subj", "/CN=localhost", "-addext", f"subjectAltName={names}",
          "-out", str(made[0]), "-keyout", str(made[1])],
         check=True, capture_output=True,
     )  # fmt: skip

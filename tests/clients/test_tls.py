@@ -33,8 +33,10 @@ class OverTls(unittest.TestCase):
             Client(self.daemon.url).info()
 
     def test_strangers_and_other_names_are_refused_at_once(self):
-        for url, ca in ((self.daemon.url, None), (self.daemon.url, self.other),
-                        (self.daemon.url.replace("127.0.0.1", "127.0.0.2"), self.ca)):  # fmt: skip
+        named, key = support.certificate(self.folder, "named", "DNS:elsewhere.test")
+        elsewhere = support.Daemon("--tls-cert", named, "--tls-key", key)
+        self.addCleanup(elsewhere.stop)
+        for url, ca in ((self.daemon.url, None), (self.daemon.url, self.other), (elsewhere.url, named)):
             with self.assertRaisesRegex(Unreachable, "(?i)certificate"):
                 Client(url, ca=ca, backoff=60).info()
         with self.assertRaises(ValueError):
