@@ -27,8 +27,9 @@ using OwnCertificate = std::unique_ptr<X509, OpenSslDeleter<X509, X509_free>>;
 using OwnContext = std::unique_ptr<SSL_CTX, OpenSslDeleter<SSL_CTX, SSL_CTX_free>>;
 using OwnSsl = std::unique_ptr<SSL, OpenSslDeleter<SSL, SSL_free>>;
 
-/// Writes a new key and a certificate signed by it, for localhost, 127.0.0.1 and pointwright.test.
-inline void write_certificate(const std::string& certificate_file, const std::string& key_file) {
+/// Writes a new key and a certificate signed by it, for the names.
+inline void write_certificate(const std::string& certificate_file, const std::string& key_file,
+                              const char* names = "DNS:localhost,DNS:pointwright.test,IP:127.0.0.1") {
   const OwnKey key(EVP_EC_gen("P-256"));
   const OwnCertificate certificate(X509_new());
   X509* const made = certificate.get();
@@ -50,7 +51,7 @@ inline void write_certificate(const std::string& certificate_file, const std::st
     X509_EXTENSION_free(extension);
   };
   extend(NID_basic_constraints, "critical,CA:TRUE");
-  extend(NID_subject_alt_name, "DNS:localhost,DNS:pointwright.test,IP:127.0.0.1");
+  extend(NID_subject_alt_name, names);
   if (X509_sign(made, key.get(), EVP_sha256()) == 0) throw std::runtime_error("cannot sign a certificate");
   const auto write = [](const std::string& path, const auto& put) {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"), std::fclose);
