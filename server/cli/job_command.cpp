@@ -101,10 +101,10 @@ CLI::App* add_job_run(CLI::App& group, JobRunOptions& options) {
           "tiles: bounded memory, binary PLY and LAS; memory: the whole scan at once; direct: on levels "
           "of its own; else tiles where that can be")
       ->check(CLI::IsMember({"tiles", "memory", "direct"}));
-  command->add_option("--s", options.s, "how far the edits are played, 0 to 1")->capture_default_str();
+  command->add_option("--s", options.s,
+                      "how far the edits are played, 0 to 1; 1 where the file does not say");
   command->add_option("--timing", options.timing, "the edits one after the other, or all at once")
-      ->check(CLI::IsMember({"sequence", "together"}))
-      ->capture_default_str();
+      ->check(CLI::IsMember({"sequence", "together"}));
   command->add_option("--neighbors", options.neighbors, "of a sample's neighbourhood, 4 to 32")
       ->check(CLI::Range(4U, 32U))
       ->capture_default_str();
@@ -138,9 +138,12 @@ int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) 
   auto request = parse_recipe_file({reinterpret_cast<const char*>(text.value().data()), text.value().size()});
   if (!request.ok()) return refuse(err, options.recipe + ": " + request.errors().summary(), 1);
   params.request = std::move(request).value();
-  if (!(options.s >= 0.0 && options.s <= 1.0)) return refuse(err, "--s lies between 0 and 1", 2);
-  if (options.s != 1.0) params.request.s = options.s;
-  if (options.timing == protocol::kTimingNames[1]) params.request.timing = protocol::Timing::kTogether;
+  if (options.s && !(*options.s >= 0.0 && *options.s <= 1.0))
+    return refuse(err, "--s lies between 0 and 1", 2);
+  params.request.s = options.s.value_or(params.request.s);
+  if (!options.timing.empty())
+    params.request.timing = options.timing == protocol::kTimingNames[1] ? protocol::Timing::kTogether
+                                                                        : protocol::Timing::kSequence;
   if (!options.preview.empty()) {
     auto preview = read_local_cloud(options.preview, {}, std::numeric_limits<std::uint64_t>::max());
     if (!preview) return refuse(err, options.preview + ": " + preview.error().message, 1);
