@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/core/execution_context.h"
+#include "engine/core/mixed_bits.h"
 #include "engine/core/points.h"
 #include "engine/simplification/contraction_kernels.h"
 #include "engine/simplification/large_array.h"
@@ -96,13 +97,10 @@ SurvivorGraph survivor_graph(const ContractionNodes& nodes, const ExecutionConte
 /// The power of two that brings the longest side of the box into [1/2, 1).
 float unit_scale(const Points& position);
 
-/// A bijection of 64 bits (the finaliser of SplitMix64): orders pairs of equal cost as if at random, so that
-/// on exact flats many of them are the first of both their samples.
+/// Orders pairs of equal cost as if at random, so that on exact flats many of them are the first of both
+/// their samples.
 inline std::uint64_t tie_key(std::uint32_t first, std::uint32_t second) {
-  std::uint64_t z = (static_cast<std::uint64_t>(first) << 32U) | second;
-  z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27U)) * 0x94d049bb133111ebULL;
-  return z ^ (z >> 31U);
+  return mixed_bits((static_cast<std::uint64_t>(first) << 32U) | second);
 }
 
 /// Both return false where they were cancelled.

@@ -47,10 +47,6 @@ std::span<std::span<const std::byte>> past(std::span<std::span<const std::byte>>
 
 }  // namespace
 
-Connection::OwnDescriptor::~OwnDescriptor() {
-  ::close(number_);
-}
-
 Connection::Connection(int descriptor, const TlsIdentity* tls)
     : descriptor_(descriptor),
       transport_(tls == nullptr ? plain_transport(descriptor) : tls->accept(descriptor)) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include "server/base/descriptor.h"
 #include "server/http/transport.h"
 
 namespace pointwright::server {
@@ -73,18 +74,7 @@ class Connection {
   /// deadline.
   bool wait_for(Moved::Status status, Clock::time_point deadline) const;
 
-  class OwnDescriptor {
-   public:
-    explicit OwnDescriptor(int descriptor) : number_(descriptor) {}
-    ~OwnDescriptor();
-    OwnDescriptor(const OwnDescriptor&) = delete;
-    OwnDescriptor& operator=(const OwnDescriptor&) = delete;
-    [[nodiscard]] int get() const { return number_; }
-
-   private:
-    int number_;
-  };
-  OwnDescriptor descriptor_;
+  Descriptor descriptor_;
   std::unique_ptr<Transport> transport_;
   std::string pending_;  // read beyond the head, not yet handed out
   bool broken_ = false;

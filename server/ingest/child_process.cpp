@@ -82,18 +82,6 @@ void set_descriptors(SpawnPlan& plan, const std::vector<Descriptor>& far) {
 
 }  // namespace
 
-Descriptor::Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
-  std::swap(number_, other.number_);
-  return *this;
-}
-Descriptor::~Descriptor() {
-  close();
-}
-void Descriptor::close() {
-  if (number_ >= 0) ::close(std::exchange(number_, -1));
-}
-
 std::optional<pid_t> start_child(const std::string& program, const char* argument,
                                  const std::vector<int>& descriptors) {
   // Copies far up: dup2 onto 3, 4, … must not hit one that is still to be copied.

@@ -9,17 +9,10 @@
 #include <cerrno>
 #include <system_error>
 
-#include "server/ingest/child_process.h"
+#include "server/base/descriptor.h"
 
 namespace pointwright {
 namespace {
-
-Error file_error(const char* what, const std::string& path, int number) {
-  const bool is_full = number == ENOSPC || number == EDQUOT || number == EFBIG;
-  return Error{.code = is_full ? ErrorCode::kTooLarge : ErrorCode::kInvalidArgument,
-               .message = std::string(what) + " " + path + ": " + std::system_category().message(number),
-               .field = "path"};
-}
 
 Error too_large(const std::string& path, std::uint64_t limit, std::uint64_t actual) {
   return Error{.code = ErrorCode::kTooLarge,
@@ -43,6 +36,13 @@ std::string temporary_name(const std::string& path) {
 
 }  // namespace
 
+Error file_error(const char* what, const std::string& path, int number) {
+  const bool is_full = number == ENOSPC || number == EDQUOT || number == EFBIG;
+  return Error{.code = is_full ? ErrorCode::kTooLarge : ErrorCode::kInvalidArgument,
+               .message = std::string(what) + " " + path + ": " + std::system_category().message(number),
+               .field = "path"};
+}
+
 Result<std::vector<std::byte>> read_file(const std::string& path, std::uint64_t max_bytes) {
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat info {};
@@ -63,36 +63,31 @@ Result<std::vector<std::byte>> read_file(const std::string& path, std::uint64_t 
   return bytes;
 }
 
-namespace {
-
-/// A new file that fill(descriptor) writes, under the name once it is whole.
-template <typename Fill>
-Result<void> make_atomically(const std::string& path, Fill fill) {
+Result<void> fill_file_atomically(const std::string& path, const std::function<Result<bool>(int)>& fill) {
   const Descriptor folder(open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!folder.is_open()) return file_error("cannot open the folder of", path, errno);
   const std::string temporary = temporary_name(path);
   {
     Descriptor file(open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
     if (!file.is_open()) return file_error("cannot create", temporary, errno);
-    const bool is_written = fill(file.get()) && fsync(file.get()) == 0;
+    const Result<bool> filled = fill(file.get());
+    const bool is_written = filled && filled.value() && fsync(file.get()) == 0;
     if (!is_written || rename(temporary.c_str(), path.c_str()) != 0) {
       const int number = errno;
       unlink(temporary.c_str());
-      return file_error("cannot write", path, number);
+      return filled ? file_error("cannot write", path, number) : filled.error();
     }
   }
   if (fsync(folder.get()) != 0) return file_error("cannot sync the folder of", path, errno);
   return {};
 }
 
-}  // namespace
-
 Result<void> write_file_atomically(const std::string& path, std::span<const std::byte> bytes) {
-  return make_atomically(path, [&](int file) { return write_all(file, bytes); });
+  return fill_file_atomically(path, [&](int file) { return write_all(file, bytes); });
 }
 
 Result<void> copy_file_atomically(const std::string& path, int file, std::uint64_t size) {
-  return make_atomically(path, [&](int copy) {
+  return fill_file_atomically(path, [&](int copy) {
     return read_pieces(file, size,
                        [copy](std::span<const std::byte> piece) { return write_all(copy, piece); });
   });

@@ -18,11 +18,18 @@ namespace pointwright {
 Result<std::vector<std::byte>> read_file(const std::string& path,
                                          std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max());
 
+/// Why a call failed, by its errno: kTooLarge where there is no room (or quota), else kInvalidArgument; field
+/// "path".
+Error file_error(const char* what, const std::string& path, int number);
+
 /// Writes to a new file beside `path`, brings it to the disk, gives it the name, brings the folder to the
 /// disk. Where any of that fails, `path` is as it was and nothing is left behind. The file is readable by its
 /// owner alone.
 /// Errors: kTooLarge (no space or quota; field "path"), kInvalidArgument (anything else; field "path")
 Result<void> write_file_atomically(const std::string& path, std::span<const std::byte> bytes);
+/// The same with what fill(descriptor) writes; false: errno says why it could not. An error of its own is
+/// what is answered.
+Result<void> fill_file_atomically(const std::string& path, const std::function<Result<bool>(int)>& fill);
 /// The same with the first `size` bytes of an open file, piece by piece.
 Result<void> copy_file_atomically(const std::string& path, int file, std::uint64_t size);
 

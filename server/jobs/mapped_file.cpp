@@ -6,35 +6,22 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <utility>
 
+#include "server/base/descriptor.h"
+#include "server/ingest/files.h"
+
 namespace pointwright::server {
-namespace {
-
-Error unreadable(const std::string& path, const std::string& why) {
-  return Error{.code = ErrorCode::kInvalidArgument, .message = path + ": " + why, .field = "path"};
-}
-
-}  // namespace
-
 Result<MappedFile> MappedFile::open(const std::string& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return unreadable(path, std::strerror(errno));
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
-  if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
-    ::close(file);
-    return unreadable(path, "not a regular file");
-  }
+  if (!file.is_open() || ::fstat(file.get(), &status) != 0) return file_error("cannot open", path, errno);
+  if (!S_ISREG(status.st_mode)) return file_error("cannot read", path, EINVAL);
   const auto size = static_cast<std::size_t>(status.st_size);
-  if (size == 0) {
-    ::close(file);
+  if (size == 0)
     return Error{.code = ErrorCode::kEmptyCloud, .message = path + ": the file is empty", .field = "path"};
-  }
-  void* const data = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, file, 0);
-  const int failure = errno;
-  ::close(file);
-  if (data == MAP_FAILED) return unreadable(path, std::strerror(failure));
+  void* const data = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, file.get(), 0);
+  if (data == MAP_FAILED) return file_error("cannot read", path, errno);
   return MappedFile(static_cast<const std::byte*>(data), size);
 }
 

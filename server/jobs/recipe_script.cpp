@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "engine/core/median.h"
 #include "engine/resampling/resampled_edit.h"
-#include "server/sessions/painter.h"
 #include "server/sessions/recipe_play.h"
 #include "server/sessions/surface_state.h"
 
@@ -109,21 +107,9 @@ class Player {
 
  private:
   std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
-    auto marks = std::make_shared<Marks>(whole_.surface->sample_count(), std::uint8_t{0});
-    Painter painter(limits_, paint_surface(whole_), {}, {});
-    for (const auto& [kind, operations, name] : {std::tuple(RegionKind::kZero, &edit.zero, "/zero"),
-                                                 std::tuple(RegionKind::kOne, &edit.one, "/one")}) {
-      for (std::size_t i = 0; i < operations->size(); ++i) {
-        const auto painted = painter.paint(kind, (*operations)[i], *marks, context_);
-        if (painted.ok()) continue;
-        Problem problem = painted.problem();
-        problem.errors.push_back(
-            {.pointer = place_in_recipe(index) + name + "/operations/" + std::to_string(i),
-             .detail = problem.detail});
-        return problem;
-      }
-    }
-    marks_ = std::move(marks);
+    auto painted = painted_for(limits_, whole_, index, edit, context_);
+    if (!painted.ok()) return painted.problem();
+    marks_ = std::move(painted.value().marks);
     return std::nullopt;
   }
 
@@ -181,12 +167,9 @@ Outcome<PlayedRecipe> play_on_preview(const protocol::RecipeRequest& request,
   Player player(std::move(preview), params, context);
   if (auto problem = player.start()) return *problem;
   const std::vector<RecipeEdit>& edits = request.recipe.edits;
-  const bool in_sequence = request.timing == protocol::Timing::kSequence;
-  const SequencePlace place = place_in_sequence(request.s, edits.size());
-  const std::size_t count = in_sequence ? place.whole + (place.part > 0.0 ? 1 : 0) : edits.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    const double part = !in_sequence ? request.s : i < place.whole ? 1.0 : place.part;
-    if (auto problem = player.add(i, edits[i], part, i + 1 < count)) return *problem;
+  const std::vector<double> parts = parts_of_recipe(request);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (auto problem = player.add(i, edits[i], parts[i], i + 1 < parts.size())) return *problem;
   }
   return player.finish();
 }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "engine/core/mixed_bits.h"
 #include "engine/core/parallel.h"
 #include "engine/io/cloud_io.h"
 #include "engine/spatial/coherent_order.h"
@@ -14,14 +15,7 @@ namespace {
 
 constexpr std::uint64_t kChunk = 1U << 20U;  // samples that are looked at together
 constexpr double kLargestCoordinate = 1e9;
-
-/// A number that looks random and belongs to the sample's number (SplitMix64's mixing function).
-std::uint64_t mixed(std::uint64_t value) {
-  value += 0x9e3779b97f4a7c15ULL;
-  value = (value ^ (value >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-  value = (value ^ (value >> 27U)) * 0x94d049bb133111ebULL;
-  return value ^ (value >> 31U);
-}
+constexpr std::uint64_t kGoldenRatio = 0x9e3779b97f4a7c15ULL;  // of 2^64: zero mixes to itself
 
 struct Part {
   Vec3d min = Vec3d::Constant(std::numeric_limits<double>::max());
@@ -68,7 +62,7 @@ Result<ScanSurvey> survey(const MappedFile& file, const ScanRecords& records, st
         }
         part.min = part.min.cwiseMin(p);
         part.max = part.max.cwiseMax(p);
-        if (mixed(i) <= limit) part.chosen.push_back(i);
+        if (mixed_bits(i + kGoldenRatio) <= limit) part.chosen.push_back(i);
       }
     });
     for (const Part& part : parts) {

@@ -13,6 +13,7 @@
 #include "engine/core/parallel.h"
 #include "engine/spatial/block_tree.h"
 #include "engine/spatial/coherent_order.h"
+#include "server/base/descriptor.h"
 #include "server/ingest/files.h"
 
 namespace pointwright::server {
@@ -23,25 +24,8 @@ constexpr std::uint64_t kIndexMagic = 0x31584449'54575054ULL;
 constexpr std::uint64_t kResultMagic = 0x31534552'54575054ULL;
 constexpr std::size_t kProbes = 64;  // blocks of samples whose neighbourhoods say how wide a ring is
 
-class OpenFile {
- public:
-  OpenFile(const std::string& path, int flags) : descriptor_(::open(path.c_str(), flags | O_CLOEXEC, 0600)) {}
-  ~OpenFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  [[nodiscard]] int get() const { return descriptor_; }
-
- private:
-  int descriptor_;
-};
-
-Error failed(const std::string& path, const char* what) {
-  const bool full = errno == ENOSPC || errno == EDQUOT;
-  return Error{.code = full ? ErrorCode::kTooLarge : ErrorCode::kInvalidArgument,
-               .message = path + ": " + what + ": " + std::strerror(errno),
-               .field = "path"};
+Descriptor opened(const std::string& path, int flags) {
+  return Descriptor(::open(path.c_str(), flags | O_CLOEXEC, 0600));
 }
 
 template <typename T>
@@ -145,8 +129,8 @@ bool TileStore::is_sorted() {
 Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
                              const ExecutionContext& context) {
   const std::string path = spool_path(folder_);
-  const OpenFile spool(path, O_WRONLY | O_CREAT | O_TRUNC);
-  if (spool.get() < 0) return failed(path, "cannot be written");
+  const Descriptor spool = opened(path, O_WRONLY | O_CREAT | O_TRUNC);
+  if (!spool.is_open()) return file_error("cannot write", path, errno);
   extents_.assign(cuts_.tile_count(), {});
   const std::byte* const first = file.bytes().data() + records.begin;
   std::vector<std::uint32_t> tiles;
@@ -180,17 +164,18 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
       place[tile + 1] += place[tile];
     }
     for (std::size_t i = 0; i < count; ++i) sorted[place[tiles[i]]++] = unsorted[i];
-    if (!write_all(spool.get(), std::as_bytes(std::span(sorted)))) return failed(path, "cannot be written");
+    if (!write_all(spool.get(), std::as_bytes(std::span(sorted))))
+      return file_error("cannot write", path, errno);
     file.release(records.begin + begin * records.record_bytes, records.begin + end * records.record_bytes);
   }
-  if (::fsync(spool.get()) != 0) return failed(path, "cannot be brought to the disk");
+  if (::fsync(spool.get()) != 0) return file_error("cannot write", path, errno);
   return write_file_atomically(index_path(folder_), index_bytes());
 }
 
 Result<void> TileStore::read_samples(std::size_t tile, std::vector<TileSample>& samples) const {
   const std::string path = spool_path(folder_);
-  const OpenFile spool(path, O_RDONLY);
-  if (spool.get() < 0) return failed(path, "cannot be read");
+  const Descriptor spool = opened(path, O_RDONLY);
+  if (!spool.is_open()) return file_error("cannot read", path, errno);
   std::size_t at = samples.size();
   samples.resize(at + static_cast<std::size_t>(sample_count(tile)));
   for (const Extent& extent : extents_[tile]) {
@@ -202,7 +187,7 @@ Result<void> TileStore::read_samples(std::size_t tile, std::vector<TileSample>& 
       if (got < 0 && errno == EINTR) continue;
       if (got <= 0) {
         if (got == 0) errno = EIO;
-        return failed(path, "cannot be read");
+        return file_error("cannot read", path, errno);
       }
       to += got;
       from += static_cast<std::uint64_t>(got);

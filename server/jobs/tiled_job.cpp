@@ -1,14 +1,10 @@
 #include "server/jobs/tiled_job.h"
 
-#include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <numbers>
@@ -40,12 +36,6 @@ constexpr double kAround = 1.5;
 constexpr std::uint64_t kCandidates = 5;  // for each sample of the preview
 constexpr std::uint64_t kLeastSurveyed = 200'000;
 constexpr std::uint64_t kWriteChunk = std::uint64_t{1} << 20U;  // samples
-
-Problem io_problem(const std::string& path, const char* what) {
-  const bool full = errno == ENOSPC || errno == EDQUOT;
-  return Problem{.kind = full ? ProblemKind::kOutOfDisk : ProblemKind::kStorageFailed,
-                 .detail = path + ": " + what + ": " + std::strerror(errno)};
-}
 
 /// Neighbourhoods around a sample that its own outcome depends on.
 std::uint32_t rings_of(const EditScript& script) {
@@ -92,25 +82,36 @@ class TiledJob {
     return std::nullopt;
   }
 
-  /// Room for the spool, the tiles' results and the output, before anything is written.
+  /// Room for the spool, the tiles' results and the output, before anything is written. What an interrupted
+  /// job has left in the folder is there already.
   [[nodiscard]] std::optional<Problem> check_disk() const {
-    const auto room = [](const std::string& path) {
-      struct statvfs status {};
-      if (::statvfs(path.c_str(), &status) != 0) return std::uint64_t{0};
-      return static_cast<std::uint64_t>(status.f_bavail) * status.f_frsize;
+    struct Place {
+      std::uint64_t free = 0;
+      dev_t device = 0;
     };
-    const std::string beside = std::filesystem::path(params_.output).parent_path().string();
-    const std::uint64_t scratch = 2 * sizeof(TileSample) * records_.count;
+    const auto place_of = [](const std::string& path) {
+      struct statvfs room {};
+      struct stat status {};
+      if (::statvfs(path.c_str(), &room) != 0 || ::stat(path.c_str(), &status) != 0) return Place{};
+      return Place{.free = static_cast<std::uint64_t>(room.f_bavail) * room.f_frsize,
+                   .device = status.st_dev};
+    };
+    std::uint64_t kept = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(params_.folder))
+      if (entry.is_regular_file()) kept += entry.file_size();
+    const std::uint64_t all = 2 * sizeof(TileSample) * records_.count;
+    const std::uint64_t scratch = all - std::min(all, kept);
     const std::uint64_t output = file_.bytes().size();
-    const std::uint64_t here = room(params_.folder);
-    const std::uint64_t there = room(beside.empty() ? "." : beside);
-    if (here >= scratch + output || (here >= scratch && there >= output && here != there))
-      return std::nullopt;
+    const std::string beside = std::filesystem::path(params_.output).parent_path().string();
+    const Place here = place_of(params_.folder);
+    const Place there = place_of(beside.empty() ? "." : beside);
+    const bool same = here.device == there.device;
+    if (here.free >= scratch + (same ? output : 0) && there.free >= output) return std::nullopt;
     return Problem{.kind = ProblemKind::kOutOfDisk,
                    .detail = "the job needs " + std::to_string(scratch >> 20U) +
                              " MiB for scratch files and " + std::to_string(output >> 20U) +
                              " MiB for its result",
-                   .limit = static_cast<double>(std::min(here, there)),
+                   .limit = static_cast<double>(std::min(here.free, there.free)),
                    .actual = static_cast<double>(scratch + output)};
   }
 
@@ -288,35 +289,20 @@ class TiledJob {
         differences.add(static_cast<double>(match.difference));
     differences.report(report_);
 
-    const std::string path = params_.output + ".part";
-    const int out = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (out < 0) return io_problem(path, "cannot be written");
-    auto problem = write_records(out, path, moved);
-    if (!problem && ::fsync(out) != 0) problem = io_problem(path, "cannot be brought to the disk");
-    ::close(out);
-    if (!problem && ::rename(path.c_str(), params_.output.c_str()) != 0)
-      problem = io_problem(params_.output, "cannot be named");
-    if (problem) {
-      ::unlink(path.c_str());
-      return problem;
-    }
-    const std::string beside = std::filesystem::path(params_.output).parent_path().string();
-    sync_folder(beside.empty() ? "." : beside);
+    const auto written =
+        fill_file_atomically(params_.output, [&](int out) { return write_records(out, moved); });
+    if (!written) return protocol::to_problem(written.error());
     return std::nullopt;
   }
 
-  std::optional<Problem> write_records(int out, const std::string& path,
-                                       std::vector<std::span<const TileSample>>& moved) {
-    const auto put = [&](std::span<const std::byte> bytes) -> std::optional<Problem> {
-      if (!write_all(out, bytes)) return io_problem(path, "cannot be written");
-      return std::nullopt;
-    };
+  /// False: errno says why.
+  Result<bool> write_records(int out, std::vector<std::span<const TileSample>>& moved) {
     const std::span<const std::byte> bytes = file_.bytes();
-    if (auto problem = put(bytes.first(static_cast<std::size_t>(records_.begin)))) return problem;
+    if (!write_all(out, bytes.first(static_cast<std::size_t>(records_.begin)))) return false;
     std::vector<std::byte> chunk;
     std::vector<std::uint8_t> unsaid(moved.size());
     for (std::uint64_t begin = 0; begin < records_.count; begin += kWriteChunk) {
-      if (context_.is_cancelled()) return protocol::to_problem(cancelled_error());
+      if (context_.is_cancelled()) return cancelled_error();
       progress_("result", 0.9 + 0.1 * static_cast<double>(begin) / static_cast<double>(records_.count));
       const std::uint64_t end = std::min(records_.count, begin + kWriteChunk);
       const std::uint64_t from = records_.begin + begin * records_.record_bytes;
@@ -335,14 +321,15 @@ class TiledJob {
           },
           1);
       if (std::ranges::find(unsaid, std::uint8_t{1}) != unsaid.end())
-        return Problem{.kind = ProblemKind::kInvalidValue,
-                       .detail =
-                           "the edits take samples to where the file's whole numbers cannot say them: the "
-                           "mode memory chooses a grid that can, and so does PLY"};
-      if (auto problem = put(chunk)) return problem;
+        return Error{.code = ErrorCode::kInvalidArgument,
+                     .message =
+                         "the edits take samples to where the file's whole numbers cannot say them: the "
+                         "mode memory chooses a grid that can, and so does PLY",
+                     .field = "deformation"};
+      if (!write_all(out, chunk)) return false;
       file_.release(from, to);
     }
-    return put(bytes.subspan(static_cast<std::size_t>(records_.end())));
+    return write_all(out, bytes.subspan(static_cast<std::size_t>(records_.end())));
   }
 
   /// False: the record cannot say the place.

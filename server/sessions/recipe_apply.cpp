@@ -88,28 +88,11 @@ class Application {
 
  private:
   std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
-    auto marks = std::make_shared<Marks>(whole_.surface->finest().position.size(), std::uint8_t{0});
-    Painter painter(session_.params(), paint_surface(whole_), {}, {});
-    const std::string place = place_in_recipe(index);
-    if (auto problem = paint(painter, RegionKind::kZero, edit.zero, *marks, place + "/zero/operations"))
-      return problem;
-    if (auto problem = paint(painter, RegionKind::kOne, edit.one, *marks, place + "/one/operations"))
-      return problem;
-    zero_ = painter.finish(RegionKind::kZero, *marks);
-    one_ = painter.finish(RegionKind::kOne, *marks);
-    marks_ = std::move(marks);
-    return std::nullopt;
-  }
-  std::optional<Problem> paint(Painter& painter, RegionKind kind,
-                               const std::vector<PaintOperation>& operations, Marks& marks,
-                               const std::string& pointer) const {
-    for (std::size_t i = 0; i < operations.size(); ++i) {
-      const auto painted = painter.paint(kind, operations[i], marks, session_.context());
-      if (painted.ok()) continue;
-      Problem problem = painted.problem();
-      problem.errors.push_back({.pointer = pointer + "/" + std::to_string(i), .detail = problem.detail});
-      return problem;
-    }
+    auto painted = painted_for(session_.params(), whole_, index, edit, session_.context());
+    if (!painted.ok()) return painted.problem();
+    zero_ = std::move(painted.value().zero);
+    one_ = std::move(painted.value().one);
+    marks_ = std::move(painted.value().marks);
     return std::nullopt;
   }
   std::optional<Problem> record(std::size_t index, const EditParams& params) {
@@ -151,6 +134,39 @@ Problem problem_of_recipe_edit(const Error& error, std::size_t edit) {
   return problem;
 }
 
+std::vector<double> parts_of_recipe(const protocol::RecipeRequest& request) {
+  const std::size_t edits = request.recipe.edits.size();
+  if (request.timing == protocol::Timing::kTogether) return std::vector<double>(edits, request.s);
+  const SequencePlace place = place_in_sequence(request.s, edits);
+  std::vector<double> parts(place.whole, 1.0);
+  if (place.part > 0.0) parts.push_back(place.part);
+  return parts;
+}
+
+Outcome<RecipePainting> painted_for(const SessionParams& limits, const SurfaceState& state, std::size_t index,
+                                    const RecipeEdit& edit, const ExecutionContext& context) {
+  auto marks = std::make_shared<Marks>(state.surface->sample_count(), std::uint8_t{0});
+  Painter painter(limits, paint_surface(state), {}, {});
+  for (const bool one : {false, true}) {
+    const std::vector<PaintOperation>& operations = one ? edit.one : edit.zero;
+    for (std::size_t i = 0; i < operations.size(); ++i) {
+      const auto painted =
+          painter.paint(one ? RegionKind::kOne : RegionKind::kZero, operations[i], *marks, context);
+      if (painted.ok()) continue;
+      Problem problem = painted.problem();
+      problem.errors.push_back(
+          {.pointer = place_in_recipe(index) + (one ? "/one" : "/zero") + "/operations/" + std::to_string(i),
+           .detail = problem.detail});
+      return problem;
+    }
+  }
+  RecipePainting result{.marks = nullptr,
+                        .zero = painter.finish(RegionKind::kZero, *marks),
+                        .one = painter.finish(RegionKind::kOne, *marks)};
+  result.marks = std::move(marks);
+  return result;
+}
+
 Outcome<SharedDocument> apply_recipe(Session& session, const protocol::RecipeRequest& request,
                                      Session::Expected expected, const Seal<SharedDocument>& seal) {
   auto forked = session.fork(expected);
@@ -161,13 +177,10 @@ Outcome<SharedDocument> apply_recipe(Session& session, const protocol::RecipeReq
     return *problem;
   if (auto problem = check_limits(session, before->head, edits)) return *problem;
   Application application(session, std::move(forked.value()));
-  const bool in_sequence = request.timing == protocol::Timing::kSequence;
-  const SequencePlace place = place_in_sequence(request.s, edits.size());
-  const std::size_t count = in_sequence ? place.whole + (place.part > 0.0 ? 1 : 0) : edits.size();
-  if (count == 0) return before;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double part = !in_sequence ? request.s : i < place.whole ? 1.0 : place.part;
-    if (auto problem = application.add(i, edits[i], part, i + 1 < count)) return *problem;
+  const std::vector<double> parts = parts_of_recipe(request);
+  if (parts.empty()) return before;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (auto problem = application.add(i, edits[i], parts[i], i + 1 < parts.size())) return *problem;
   }
   return session.adopt(application.finish(), seal);
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/sessions/recipes.h"
 
@@ -22,6 +23,20 @@ SequencePlace place_in_sequence(double s, std::size_t edits);
 std::string place_in_recipe(std::size_t edit);
 /// The problem of one edit of a recipe, its pointers those of the document.
 protocol::Problem problem_of_recipe_edit(const Error& error, std::size_t edit);
+
+/// How much of each edit of a recipe is made, in order, up to `s`: 1 is the whole of it. Edits that are not
+/// reached are missing.
+std::vector<double> parts_of_recipe(const protocol::RecipeRequest& request);
+
+/// A recipe's regions for one edit, painted from empty marks.
+struct RecipePainting {
+  SharedMarks marks;
+  Painting zero;
+  Painting one;
+};
+/// Pre:      the edit paints. Problems: those of painting, with pointers into the request's document
+Outcome<RecipePainting> painted_for(const SessionParams& limits, const SurfaceState& state, std::size_t index,
+                                    const protocol::RecipeEdit& edit, const ExecutionContext& context);
 
 /// The state after an edit with a painting; what it may be refused for when it is made, it is refused for
 /// here too.

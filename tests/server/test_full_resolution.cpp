@@ -170,6 +170,38 @@ TEST_CASE("a job changes positions and normals of what moves, and not a byte of 
         doctest::Approx(protocol::to_radians(25.0)).epsilon(0.2));
 }
 
+TEST_CASE("a preview that is given is the one that counts, in tiles and in memory, whatever its origin") {
+  const JobFolder job;
+  const Cloud sheet = wavy_sheet(200);
+  put(job.in, sheet);
+  std::vector<std::uint32_t> every;
+  for (std::uint32_t i = 0; i < sheet.size(); i += 8) every.push_back(i);
+  auto preview = std::make_shared<Cloud>(permuted(sheet, every));
+  JobParams params = job.params();
+  params.preview = preview;
+  const JobReport tiled = job.run(params);
+  CHECK(tiled.preview_samples == every.size());
+  CHECK(tiled.matched == every.size());
+  const Cloud expected = cloud_of(job.out);
+  params.mode = JobMode::kMemory;
+  CHECK(job.run(params).matched == every.size());
+  CHECK(cloud_of(job.out).position == expected.position);
+  // About another origin, which float32 rounds a little differently.
+  preview->origin = Vec3d(4.0, 0.0, 0.0);
+  for (std::size_t i = 0; i < preview->size(); ++i)
+    preview->position.set(i, preview->position[i] - Vec3f(4.0F, 0.0F, 0.0F));
+  for (const JobMode mode : {JobMode::kTiles, JobMode::kMemory}) {
+    params.mode = mode;
+    const JobReport moved = job.run(params);
+    CHECK(moved.matched == every.size());
+    double worst = 0.0;
+    const Cloud made = cloud_of(job.out);
+    for (std::size_t i = 0; i < made.size(); ++i)
+      worst = std::max(worst, static_cast<double>((made.position[i] - expected.position[i]).norm()));
+    CHECK(worst < 1e-4);
+  }
+}
+
 TEST_CASE("in tiles and in memory the same comes out, with any number of threads") {
   const JobFolder job;
   put(job.in, wavy_sheet(200));
