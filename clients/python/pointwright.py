@@ -733,10 +733,11 @@ class Client:
     ) -> requests.Response:
         """Any request to the server: `path` below its URL. Answers a response of success, or raises.
 
-        POST requests carry an Idempotency-Key, the same one on each repetition. One whose answer was lost is made again
-        only where the server says that it knows such keys ("idempotency-keys" among the features of /v1/info)."""
+        POST requests, and DELETE of an edit, carry an Idempotency-Key, the same one on each repetition. One whose
+        answer was lost is made again only where the server says that it knows such keys ("idempotency-keys" among the features of /v1/info)."""
         sent = dict(headers or {})
-        if method == "POST":
+        keyed = method == "POST" or (method == "DELETE" and "/edits/" in path)
+        if keyed:
             sent.setdefault("Idempotency-Key", str(uuid.uuid4()))
         body = data
         if json is not None:
@@ -755,7 +756,7 @@ class Client:
             except requests.exceptions.SSLError as error:
                 raise Unreachable(f"{method} {self.url}{path}: {error}") from error
             except (requests.ConnectionError, requests.Timeout, requests.exceptions.ChunkedEncodingError) as error:
-                if last or not self._may_repeat(method, error):
+                if last or not self._may_repeat(keyed, error):
                     raise Unreachable(f"{method} {self.url}{path}: {error}") from error
                 self._pause(attempt, None)
                 continue
@@ -772,9 +773,9 @@ class Client:
             self._pause(attempt, problem.retry_after)
         raise AssertionError("not reached")
 
-    def _may_repeat(self, method: str, error: Exception) -> bool:
+    def _may_repeat(self, keyed: bool, error: Exception) -> bool:
         never_sent = "NewConnectionError" in repr(error) or isinstance(error, requests.exceptions.ConnectTimeout)
-        if method != "POST" or never_sent:
+        if not keyed or never_sent:
             return True
         try:
             return self.has_feature("idempotency-keys")

@@ -84,6 +84,11 @@ Outcome<std::vector<TokenEntry>> edit_token_file(
   }
   if (auto changed = change(tokens); !changed.ok()) return changed.problem();
   const std::string text = protocol::to_text(protocol::token_file(tokens)) + "\n";
+  if (text.size() > kMaxFileBytes)
+    return Problem{.kind = ProblemKind::kTooMany,
+                   .detail = path + ": there are as many tokens as a file takes; revoke some",
+                   .limit = static_cast<double>(kMaxFileBytes),
+                   .actual = static_cast<double>(text.size())};
   if (const auto written = write_file_atomically(path, std::as_bytes(std::span(text.data(), text.size())));
       !written)
     return unusable(path, written.error().message);
@@ -164,9 +169,14 @@ Outcome<Done> TokenStore::edit(const std::function<Outcome<Done>(std::vector<Tok
   return Done{};
 }
 
-Outcome<NewToken> TokenStore::add(protocol::TokenRequest terms) {
+Outcome<NewToken> TokenStore::add(protocol::TokenRequest terms, std::uint64_t most) {
   NewToken token = make_token(std::move(terms));
   const auto added = edit([&](std::vector<TokenEntry>& tokens) -> Outcome<Done> {
+    if (tokens.size() >= most)
+      return Problem{.kind = ProblemKind::kTooMany,
+                     .detail = "there are as many tokens as there may be (max_tokens); revoke some",
+                     .limit = static_cast<double>(most),
+                     .actual = static_cast<double>(tokens.size() + 1)};
     tokens.push_back(token.entry);
     return Done{};
   });

@@ -1,6 +1,7 @@
 #pragma once
 // The tokens that the operator handed out: a file that its owner alone may read, and what is held of it.
 
+#include <cstdint>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -52,8 +53,9 @@ class TokenStore {
   [[nodiscard]] std::optional<TokenEntry> find(std::string_view id) const;
   [[nodiscard]] std::vector<protocol::TokenDocument> list() const;
 
-  /// Problems: wrong state (no tokens are in use), internal error (the file cannot be written).
-  Outcome<NewToken> add(protocol::TokenRequest terms);
+  /// `most`: so many there may be. Problems: wrong state (no tokens are in use), too many, internal error
+  /// (the file cannot be written).
+  Outcome<NewToken> add(protocol::TokenRequest terms, std::uint64_t most);
   /// Problems: besides, not found
   Outcome<Done> revoke(const std::string& id);
 

@@ -87,6 +87,11 @@ constexpr std::array kTable = {
     LimitInfo{"token_streams", &Limits::token_streams, 0, 10'000, "streams of one token open at once"},
     LimitInfo{"token_requests_per_second", &Limits::token_requests_per_second, 1, 1'000'000,
               "requests of one token in a second, in the long run"},
+    LimitInfo{"token_uploads", &Limits::token_uploads, 0, 100'000,
+              "resumable uploads of one token held at once"},
+    LimitInfo{"token_upload_file_bytes", &Limits::token_upload_file_bytes, 0, kTebi,
+              "bytes of one token's resumable uploads together, as they are announced"},
+    LimitInfo{"max_tokens", &Limits::max_tokens, 1, 10'000, "tokens, those that have expired included"},
 };
 
 }  // namespace

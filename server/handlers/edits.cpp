@@ -30,12 +30,16 @@ Response amended(Service& service, const Request& request, const std::optional<E
   const auto revision = required_revision(request.head);
   if (!revision.ok()) return problem_response(revision.problem(), request);
   const auto begin = std::chrono::steady_clock::now();
+  const auto answer = [&session](const SharedDocument& document) {
+    return session_response(*session.value(), *document);
+  };
+  const auto seal = sealed<SharedDocument>(request, answer);
   const auto done = computed(service.background, [&] {
-    return amend(*session.value(), edit_of(request), params, revision.value());
+    return amend(*session.value(), edit_of(request), params, revision.value(), seal);
   });
   if (!done.ok()) return problem_response(done.problem(), request);
   if (!done.value().ok()) return problem_response(done.value().problem(), request);
-  Response response = session_response(*session.value(), *done.value().value());
+  Response response = answer_of(request, done.value().value(), answer);
   response.timings.emplace_back(
       "replay", std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
   return response;

@@ -10,7 +10,7 @@ Response list_tokens(Service& service, const Request&) {
 Response create_token(Service& service, const Request& request) {
   const auto terms = parsed_body(service, request, protocol::parse_token_request);
   if (!terms.ok()) return problem_response(terms.problem(), request);
-  const auto made = service.access.tokens.add(terms.value());
+  const auto made = service.access.tokens.add(terms.value(), service.config.limits.max_tokens);
   if (!made.ok()) return problem_response(made.problem(), request);
   protocol::JsonDocument document = protocol::to_json(made.value().entry.document);
   document["secret"] = made.value().secret;

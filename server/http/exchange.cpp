@@ -206,6 +206,8 @@ Response Exchange::dispatch() {
   log_.route = endpoint.route;
   log_.token = endpoint.caller.token;
   if (auto problem = check_body(endpoint.body)) return refuse(*problem);
+  if (endpoint.charge)
+    if (auto charged = endpoint.charge(); !charged.ok()) return refuse(charged.problem());
   Request request{.head = head,
                   .id = request_id_,
                   .captures = std::move(endpoint.captures),

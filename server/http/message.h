@@ -129,6 +129,8 @@ struct Endpoint {
   Budget* body_memory = nullptr;
   /// Makes what takes the body, before it is read; null: it is held in memory.
   std::function<Outcome<std::shared_ptr<BodyTarget>>(const Request&)> open_target = {};
+  /// What the body costs the caller, once nothing in the head speaks against reading it; null: nothing.
+  std::function<Outcome<Done>()> charge = {};
   Caller caller = {};  ///< who asks
 };
 using Resolution = std::variant<Response, Endpoint>;

@@ -69,7 +69,7 @@ constexpr std::array kRoutes = {
     Route{kPost, "/v1/sessions/{id}/edits", Body::kJson, post_edit, kByMethod, kOnce},
     Route{kGet, "/v1/sessions/{id}/edits/{edit}", Body::kNone, get_edit},
     Route{kPut, "/v1/sessions/{id}/edits/{edit}", Body::kJson, put_edit},
-    Route{kDelete, "/v1/sessions/{id}/edits/{edit}", Body::kNone, delete_edit},
+    Route{kDelete, "/v1/sessions/{id}/edits/{edit}", Body::kNone, delete_edit, kByMethod, kOnce},
     Route{kPut, "/v1/sessions/{id}/head", Body::kJson, put_head},
     Route{kGet, "/v1/sessions/{id}/recipe", Body::kNone, get_recipe},
     Route{kPost, "/v1/sessions/{id}/recipe", Body::kLargeJson, post_recipe, kByMethod, kOnce},
@@ -116,8 +116,7 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
 /// Where the bytes of a body are held from as they arrive. Documents have a reserve of their own, so that no
 /// upload keeps a hand waiting. A body for which there is no room now is refused before it is read; one over
 /// its limit is let through: the fence refuses it.
-Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const RequestHead& head,
-                            const Caller& caller) {
+Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const RequestHead& head) {
   const bool is_upload = policy.kind == Body::kCloud || policy.kind == Body::kImage;
   Budget& memory = is_upload ? service.upload_memory : service.json_memory;
   const std::uint64_t length = head.content_length.value_or(0);
@@ -132,8 +131,6 @@ Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const Re
                    .detail = "other requests take the memory for bodies",
                    .limit = static_cast<double>(memory.total()),
                    .actual = static_cast<double>(held + length)};
-  if (is_upload)
-    if (auto charged = service.access.charge_upload(caller, length); !charged.ok()) return charged.problem();
   return &memory;
 }
 
@@ -235,9 +232,13 @@ Resolution endpoint_of(Service& service, const Route& route, std::vector<std::st
     const auto open = route.method == kPost ? open_new_upload : open_upload;
     endpoint.open_target = [&service, open](const Request& r) { return open(service, r); };
   } else if (route.body != Body::kNone) {
-    auto admitted = admit_body(service, endpoint.body, head, caller.value());
+    auto admitted = admit_body(service, endpoint.body, head);
     if (!admitted.ok()) return problem_response(admitted.problem(), head.path, request_id);
     endpoint.body_memory = admitted.value();
+    if (endpoint.body_memory == &service.upload_memory)
+      endpoint.charge = [&service, who = caller.value(), bytes = head.content_length.value_or(0)] {
+        return service.access.charge_upload(who, bytes);
+      };
   }
   endpoint.caller = std::move(caller.value());
   return endpoint;

@@ -68,7 +68,7 @@ Problem of_later_edit(Problem problem, std::size_t index) {
 }  // namespace
 
 Outcome<SharedDocument> amend(Session& session, std::size_t edit, const std::optional<EditParams>& params,
-                              Session::Expected expected) {
+                              Session::Expected expected, const Seal<SharedDocument>& seal) {
   auto forked = session.fork(expected);
   if (!forked.ok()) return forked.problem();
   Session::Fork fork = std::move(forked.value());
@@ -94,7 +94,7 @@ Outcome<SharedDocument> amend(Session& session, std::size_t edit, const std::opt
   document.named = remaking.carried_here(*document.surface.samples, document.named);
   document.marks = remaking.carried_here(*document.surface.samples, document.marks);
   fork.document = std::make_shared<const Document>(std::move(document));
-  return session.adopt(std::move(fork));
+  return session.adopt(std::move(fork), seal);
 }
 
 }  // namespace pointwright::server

@@ -15,8 +15,9 @@ namespace pointwright::server {
 /// `edit`:   1 for the first one
 /// Problems: not found, wrong state, a stale revision (also where the session changes meanwhile), and what
 ///           the edits are refused for, with the number of the edit where it is a later one
+/// `seal`:   keeps an answer with the change
 /// Cost:     a replay of the edits from this one on: call it on the background pool
 Outcome<SharedDocument> amend(Session& session, std::size_t edit, const std::optional<EditParams>& params,
-                              Session::Expected expected);
+                              Session::Expected expected, const Seal<SharedDocument>& seal = {});
 
 }  // namespace pointwright::server

@@ -1,6 +1,7 @@
 #include "server/store/blob_store.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -49,28 +50,50 @@ bool has_hash(const std::string& path, std::uint64_t size, const std::string& sh
   return file.is_open() && has_hash(file.get(), size, sha256);
 }
 
+/// Whether the path is a name of the open file.
+bool is_named(int file, const std::string& path) {
+  struct stat opened {};
+  struct stat named {};
+  return ::fstat(file, &opened) == 0 && ::lstat(path.c_str(), &named) == 0 && opened.st_ino == named.st_ino &&
+         opened.st_dev == named.st_dev;
+}
+
 }  // namespace
 
-Outcome<std::shared_ptr<const void>> BlobStore::put(const std::string& sha256, const BlobContent& content) {
+std::shared_ptr<BlobStore::Pin> BlobStore::pin_locked(const std::string& sha256) const {
+  std::erase_if(pins_, [](const auto& entry) { return entry.second.expired(); });
+  std::weak_ptr<Pin>& known = pins_[sha256];
+  auto pin = known.lock();
+  if (pin == nullptr) {
+    pin = std::make_shared<Pin>();
+    known = pin;
+  }
+  return pin;
+}
+
+void BlobStore::fail() {
   const std::lock_guard lock(mutex_);
+  failed_ = true;
+}
+
+Outcome<std::shared_ptr<const void>> BlobStore::put(const std::string& sha256, const BlobContent& content) {
   const Problem failure{.kind = ProblemKind::kStorageFailed,
                         .detail = "the disk has failed: nothing can be stored"};
-  if (failed_) return failure;
+  std::shared_ptr<Pin> pin;
   {
-    const std::lock_guard pins_lock(*pins_mutex_);
-    ++(*pins_)[sha256];
+    const std::lock_guard lock(mutex_);
+    if (failed_) return failure;
+    pin = pin_locked(sha256);
   }
-  std::shared_ptr<const void> pin(nullptr, [pins = pins_, mutex = pins_mutex_, sha256](const void*) {
-    const std::lock_guard pins_lock(*mutex);
-    if (--(*pins)[sha256] == 0) pins->erase(sha256);
-  });
+  // Only those who store the same content wait for each other.
+  const std::lock_guard turn(pin->turn);
   const std::string path = path_of(sha256);
   std::error_code none;
   if (std::filesystem::file_size(path, none) == content.size && !none &&
       has_hash(path, content.size, sha256)) {
     // Its name may not be on the disk yet: whoever gave it may have been stopped right then.
-    if (sync_folder(folder_.blobs())) return pin;
-    failed_ = true;
+    if (sync_folder(folder_.blobs())) return std::shared_ptr<const void>(pin);
+    fail();
     return failure;
   }
   std::filesystem::remove(path, none);  // damaged, where it is there
@@ -79,10 +102,10 @@ Outcome<std::shared_ptr<const void>> BlobStore::put(const std::string& sha256, c
   if (stored == Stored::kFull)
     return Problem{.kind = ProblemKind::kOutOfDisk, .detail = "the disk is full; nothing was stored"};
   if (stored == Stored::kFailed) {
-    failed_ = true;
+    fail();
     return failure;
   }
-  return pin;
+  return std::shared_ptr<const void>(pin);
 }
 
 Outcome<std::shared_ptr<const BlobStore::Open>> BlobStore::open(const std::string& sha256) const {
@@ -100,8 +123,15 @@ Outcome<std::shared_ptr<const BlobStore::Open>> BlobStore::open(const std::strin
     blob->size = size;
     return std::shared_ptr<const Open>(std::move(blob));
   }
-  const std::lock_guard lock(mutex_);
-  std::filesystem::rename(path, folder_.quarantine() + "/" + sha256, none);
+  std::shared_ptr<Pin> pin;
+  {
+    const std::lock_guard lock(mutex_);
+    pin = pin_locked(sha256);
+  }
+  const std::lock_guard turn(pin->turn);
+  // What was read, and not what has been put in its place meanwhile.
+  if (is_named(blob->file.get(), path))
+    std::filesystem::rename(path, folder_.quarantine() + "/" + sha256, none);
   return damaged;
 }
 
@@ -121,10 +151,7 @@ Outcome<std::vector<std::byte>> BlobStore::read(const std::string& sha256) const
 
 void BlobStore::drop(const std::string& sha256, const IsUsed& is_used) {
   const std::lock_guard lock(mutex_);
-  {
-    const std::lock_guard pins_lock(*pins_mutex_);
-    if (pins_->count(sha256) > 0) return;
-  }
+  if (const auto pin = pins_.find(sha256); pin != pins_.end() && !pin->second.expired()) return;
   std::error_code none;  // what stays goes with the next sweep
   if (!is_used(sha256)) std::filesystem::remove(path_of(sha256), none);
 }

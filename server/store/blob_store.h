@@ -56,13 +56,18 @@ class BlobStore {
   [[nodiscard]] bool has_failed() const;
 
  private:
+  /// A blob that nobody deletes as long as this lives.
+  struct Pin {
+    std::mutex turn;  // of whoever puts it there or aside
+  };
   [[nodiscard]] std::string path_of(const std::string& sha256) const;
+  [[nodiscard]] std::shared_ptr<Pin> pin_locked(const std::string& sha256) const;
+  void fail();
 
   const DataFolder& folder_;
-  mutable std::mutex mutex_;  // guards what follows, and which blobs there are
+  mutable std::mutex mutex_;  // guards what follows; nobody writes a blob under it
   bool failed_ = false;
-  std::shared_ptr<std::map<std::string, int>> pins_ = std::make_shared<std::map<std::string, int>>();
-  std::shared_ptr<std::mutex> pins_mutex_ = std::make_shared<std::mutex>();  // guards the pins
+  mutable std::map<std::string, std::weak_ptr<Pin>> pins_;
 };
 
 }  // namespace pointwright::server

@@ -61,6 +61,24 @@ Problem CloudStore::out_of_space(std::uint64_t bytes) const {
           .actual = static_cast<double>(memory_.held() + bytes)};
 }
 
+std::shared_ptr<void> CloudStore::room_for(std::uint64_t bytes, const StoredCloud* loading) const {
+  std::shared_ptr<void> memory = memory_.hold(bytes);
+  if (memory != nullptr || archive_ == nullptr || bytes > memory_.total()) return memory;
+  std::vector<SharedCloud> oldest = list();
+  std::sort(oldest.begin(), oldest.end(),
+            [](const SharedCloud& a, const SharedCloud& b) { return a->asked_.load() < b->asked_.load(); });
+  for (const SharedCloud& cloud : oldest) {
+    if (cloud.get() == loading) continue;
+    const std::unique_lock lock(cloud->mutex_, std::try_to_lock);  // who has it is about to use it
+    if (!lock.owns_lock() || cloud->cloud_ == nullptr || cloud->cloud_.use_count() > 1) continue;
+    cloud->cloud_.reset();
+    cloud->memory_.reset();
+    memory = memory_.hold(bytes);
+    if (memory != nullptr) break;
+  }
+  return memory;
+}
+
 void CloudStore::restore(std::vector<KeptCloud> clouds) {
   const std::lock_guard lock(mutex_);
   for (KeptCloud& kept : clouds) {
@@ -91,7 +109,8 @@ Outcome<SharedCloud> CloudStore::add(NewCloud cloud, const BlobContent& file,
                                      const Seal<protocol::CloudDocument>& seal) {
   const std::uint64_t bytes = memory_of(cloud.cloud);
   auto stored = std::make_shared<StoredCloud>();
-  stored->memory_ = memory_.hold(bytes);
+  stored->memory_ = room_for(bytes, nullptr);
+  stored->asked_ = ++asking_;
   if (stored->memory_ == nullptr) return out_of_space(bytes);
   stored->document = std::move(cloud.document);
   stored->owner = std::move(cloud.owner);
@@ -143,6 +162,7 @@ SharedCloud CloudStore::find(const std::string& sha256, const std::string& name)
 
 Outcome<std::shared_ptr<const Cloud>> CloudStore::samples_of(const StoredCloud& cloud) const {
   const std::lock_guard lock(cloud.mutex_);
+  cloud.asked_ = ++asking_;
   if (cloud.cloud_ != nullptr) return cloud.cloud_;
   POINTWRIGHT_CHECK(archive_ != nullptr && load_, "samples that are not there come from an archive");
   const auto file = archive_->open_file(cloud.document.sha256);
@@ -153,8 +173,13 @@ Outcome<std::shared_ptr<const Cloud>> CloudStore::samples_of(const StoredCloud& 
     return Problem{.kind = ProblemKind::kDamaged,
                    .detail = "the stored file no longer gives the samples that it gave: they are not served"};
   const std::uint64_t bytes = memory_of(loaded.value());
-  auto memory = memory_.hold(bytes);
-  if (memory == nullptr) return out_of_space(bytes);
+  auto memory = room_for(bytes, &cloud);
+  if (memory == nullptr && bytes > memory_.total()) return out_of_space(bytes);
+  if (memory == nullptr)
+    return Problem{.kind = ProblemKind::kOverloaded,
+                   .detail = "clouds that are in use take the memory for clouds",
+                   .limit = static_cast<double>(memory_.total()),
+                   .actual = static_cast<double>(memory_.held() + bytes)};
   cloud.memory_ = std::move(memory);
   cloud.cloud_ = std::make_shared<const Cloud>(std::move(loaded.value()));
   return cloud.cloud_;

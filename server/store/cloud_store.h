@@ -19,7 +19,8 @@
 
 namespace pointwright::server {
 
-/// One cloud. Immutable but for the number of sessions that use it, and for whether its samples are there.
+/// One cloud. Immutable but for the number of sessions that use it, and for whether its samples are there:
+/// those that nobody holds and an archive has make room for others.
 struct StoredCloud {
   protocol::CloudDocument document;
   std::string owner;                  ///< the id of a token; empty: made where none were in use
@@ -32,7 +33,8 @@ struct StoredCloud {
   friend class CloudStore;
   mutable std::mutex mutex_;  // guards the next two
   mutable std::shared_ptr<const Cloud> cloud_;
-  mutable std::shared_ptr<void> memory_;  // its part of the budget
+  mutable std::shared_ptr<void> memory_;         // its part of the budget
+  mutable std::atomic<std::uint64_t> asked_{0};  // when its samples were last asked for, of all asking
 };
 using SharedCloud = std::shared_ptr<const StoredCloud>;
 
@@ -67,7 +69,8 @@ class CloudStore {
   [[nodiscard]] SharedCloud find(const std::string& id) const;
   /// The one of a file and a name; null where there is none.
   [[nodiscard]] SharedCloud find(const std::string& sha256, const std::string& name) const;
-  /// Its samples, from the archive where they are not there. Problems: damaged, out of space, overloaded.
+  /// Its samples, from the archive where they are not there. Problems: damaged; out of space (more than all
+  /// clouds may take); overloaded (those that are in use leave no room now).
   [[nodiscard]] Outcome<std::shared_ptr<const Cloud>> samples_of(const StoredCloud& cloud) const;
   /// Lets the samples go where nobody else has them and the archive gives them again.
   void let_go(const StoredCloud& cloud) const;
@@ -83,11 +86,15 @@ class CloudStore {
  private:
   [[nodiscard]] Outcome<Done> check_room_locked() const;
   [[nodiscard]] protocol::Problem out_of_space(std::uint64_t bytes) const;
+  /// A part of the budget, for which samples are let go that nobody holds, those first that were asked for
+  /// longest ago. Null where there is none. `loading`: the cloud that it is for, locked by the caller.
+  [[nodiscard]] std::shared_ptr<void> room_for(std::uint64_t bytes, const StoredCloud* loading) const;
 
   const std::uint64_t max_clouds_;
   Archive* const archive_;
   const CloudLoader load_;
   mutable Budget memory_;
+  mutable std::atomic<std::uint64_t> asking_{0};
   mutable std::mutex mutex_;  // guards what follows
   std::vector<SharedCloud> clouds_;
   std::size_t coming_ = 0;  // clouds that are being stored

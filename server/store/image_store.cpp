@@ -77,15 +77,17 @@ Outcome<Done> ImageStore::check_room() const {
 }
 
 Outcome<std::shared_ptr<const ImageContent>> ImageStore::decoded(const ImageDecoder& decode,
-                                                                 std::span<const std::byte> file) const {
+                                                                 std::span<const std::byte> file,
+                                                                 const StoredImage* loading) const {
   // What the header claims is reserved before anything is decoded.
   const auto claim = png_gate(file, limits_);
   if (!claim) return protocol::to_problem(claim.error());
   const std::uint64_t claimed = claim.value().value_bytes + file.size();
   auto content = std::make_shared<ImageContent>();
-  content->memory = memory_.hold(claimed);
+  content->memory = room_for(claimed, loading);
+  const bool may_pass = loading != nullptr && claimed <= memory_.total();
   if (content->memory == nullptr)
-    return Problem{.kind = ProblemKind::kOutOfSpace,
+    return Problem{.kind = may_pass ? ProblemKind::kOverloaded : ProblemKind::kOutOfSpace,
                    .detail = "the memory for images is used up",
                    .limit = static_cast<double>(memory_.total()),
                    .actual = static_cast<double>(memory_.held() + claimed)};
@@ -101,10 +103,24 @@ Outcome<std::shared_ptr<const ImageContent>> ImageStore::decoded(const ImageDeco
   return std::shared_ptr<const ImageContent>(std::move(content));
 }
 
+std::shared_ptr<Budget::Hold> ImageStore::room_for(std::uint64_t bytes, const StoredImage* loading) const {
+  auto memory = memory_.hold(bytes);
+  if (memory != nullptr || archive_ == nullptr || bytes > memory_.total()) return memory;
+  for (const SharedImage& image : list()) {
+    if (image.get() == loading) continue;
+    const std::unique_lock lock(image->mutex_, std::try_to_lock);  // who has it is about to use it
+    if (!lock.owns_lock() || image->content_ == nullptr || image->content_.use_count() > 1) continue;
+    image->content_.reset();
+    memory = memory_.hold(bytes);
+    if (memory != nullptr) break;
+  }
+  return memory;
+}
+
 Outcome<SharedImage> ImageStore::add(const ImageDecoder& decode, std::span<const std::byte> file,
                                      std::string owner, std::shared_ptr<const void> quota) {
   if (file.empty()) return Problem{.kind = ProblemKind::kEmptyBody, .detail = "the upload has no bytes"};
-  auto content = decoded(decode, file);
+  auto content = decoded(decode, file, nullptr);
   if (!content.ok()) return content.problem();
   const Image& image = content.value()->image;
   auto stored = std::make_shared<StoredImage>();
@@ -141,7 +157,7 @@ Outcome<std::shared_ptr<const ImageContent>> ImageStore::content_of(const ImageD
   POINTWRIGHT_CHECK(archive_ != nullptr, "content that is not there comes from an archive");
   const auto file = archive_->file(image.sha256);
   if (!file.ok()) return file.problem();
-  auto content = decoded(decode, file.value());
+  auto content = decoded(decode, file.value(), &image);
   if (!content.ok()) return content;
   image.content_ = content.value();
   return content;

@@ -76,7 +76,11 @@ class ImageStore {
  private:
   [[nodiscard]] Outcome<Done> check_room_locked() const;
   [[nodiscard]] Outcome<std::shared_ptr<const ImageContent>> decoded(const ImageDecoder& decode,
-                                                                     std::span<const std::byte> file) const;
+                                                                     std::span<const std::byte> file,
+                                                                     const StoredImage* loading) const;
+  /// A part of the budget, for which content is let go that nobody holds and the archive has. Null where
+  /// there is none. `loading`: the image that it is for, locked by the caller.
+  [[nodiscard]] std::shared_ptr<Budget::Hold> room_for(std::uint64_t bytes, const StoredImage* loading) const;
 
   const std::uint64_t max_images_;
   const ImageLimits limits_;

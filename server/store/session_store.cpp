@@ -38,6 +38,8 @@ constexpr std::uint64_t kHistoryStates = 32;
 constexpr std::uint64_t kStateBytesPerSample = 52;
 
 constexpr std::chrono::seconds kExpiryInterval{10};
+/// A session that could not be brought back is not tried again before.
+constexpr std::chrono::seconds kWakePause{1};
 
 /// What choosing so many of N samples takes while it lasts (engine/simplification/subsample.h).
 std::uint64_t memory_to_choose(std::uint64_t count, std::uint64_t of) {
@@ -83,6 +85,13 @@ SessionStore::~SessionStore() {
 bool SessionStore::Entry::is_idle() const {
   return session == nullptr ||
          (session.use_count() == 1 && session->document()->state != protocol::SessionState::kBuilding);
+}
+
+bool SessionStore::Entry::may_wake_again() const {
+  if (session == nullptr || !woken || std::chrono::steady_clock::now() - *woken < kWakePause) return false;
+  const SharedDocument document = session->document();
+  return document->state == protocol::SessionState::kFailed && document->error &&
+         document->error->kind != ProblemKind::kDamaged;
 }
 
 SessionStore::Needs SessionStore::needs_of(const HierarchyParams& params, std::uint64_t samples,
@@ -283,7 +292,7 @@ Outcome<std::shared_ptr<Session>> SessionStore::get(const std::string& id) {
     const auto entry = entry_of(id);
     if (entry == entries_.end()) return no_such_session();
     entry->kept.used = std::chrono::system_clock::now();
-    if (entry->session != nullptr) return entry->session;
+    if (entry->session != nullptr && !entry->may_wake_again()) return entry->session;
     turn = entry->turn;
   }
   const std::lock_guard waking(*turn);
@@ -299,14 +308,23 @@ void SessionStore::mark_damaged(const std::string& id, const std::string& reason
 
 Outcome<std::shared_ptr<Session>> SessionStore::wake(const std::string& id) {
   KeptSession kept;
+  std::shared_ptr<Session> failed;
+  std::shared_ptr<Budget::Hold> its_memory;
   {
     const std::lock_guard lock(mutex_);
     const auto entry = entry_of(id);
     if (entry == entries_.end()) return no_such_session();
-    if (entry->session != nullptr) return entry->session;
+    if (entry->session != nullptr && !entry->may_wake_again()) return entry->session;
+    failed = std::move(entry->session);
+    its_memory = std::move(entry->memory);
+    entry->session = nullptr;
+    entry->memory = nullptr;
     if (entry->kept.damage) return Problem{.kind = ProblemKind::kDamaged, .detail = *entry->kept.damage};
     kept = entry->kept;
   }
+  if (failed != nullptr) failed->close("the session is brought back once more");
+  failed = nullptr;
+  its_memory = nullptr;
   auto document = archive_->load(id);
   if (!document.ok()) {
     if (document.problem().kind == ProblemKind::kDamaged) mark_damaged(id, document.problem().detail);
@@ -337,6 +355,7 @@ Outcome<std::shared_ptr<Session>> SessionStore::wake(const std::string& id) {
     entry->session = session;
     entry->memory = std::move(memory.value());
     entry->bytes = needs.live + needs.history;
+    entry->woken = std::chrono::steady_clock::now();
   }
   session->start();
   return session;

@@ -1,6 +1,7 @@
 #pragma once
 // All sessions: those that are awake, and those that sleep in the archive until somebody asks for them.
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -38,7 +39,8 @@ class SessionStore {
   Outcome<std::shared_ptr<Session>> create(const protocol::CreateSessionRequest& request,
                                            const Caller& caller = {}, std::shared_ptr<const void> quota = {},
                                            const Seal<std::shared_ptr<Session>>& seal = {});
-  /// The session, woken where it sleeps: it is then built once more, as its state says.
+  /// The session, woken where it sleeps, or where it was not brought back for a reason that may have passed:
+  /// it is then built once more, as its state says.
   /// Problems: not found, damaged, out of space, overloaded
   Outcome<std::shared_ptr<Session>> get(const std::string& id);
   [[nodiscard]] std::vector<std::shared_ptr<Session>> awake() const;  ///< oldest first
@@ -66,10 +68,14 @@ class SessionStore {
     std::shared_ptr<const void> quota;
     std::shared_ptr<Budget::Hold> memory;
     std::uint64_t bytes = 0;  // of the memory, but for what resampling took
+    /// When it was last woken; none where it was opened and has not slept since.
+    std::optional<std::chrono::steady_clock::time_point> woken = std::nullopt;
     std::shared_ptr<std::mutex> turn = std::make_shared<std::mutex>();  // of whoever wakes or removes it
 
     /// Nobody else has it, not even its strand. Under the store's mutex, which hands it out.
     [[nodiscard]] bool is_idle() const;
+    /// It was not brought back, for a reason that may have passed by now.
+    [[nodiscard]] bool may_wake_again() const;
   };
   struct Needs {
     std::uint64_t live = 0;

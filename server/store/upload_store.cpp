@@ -172,7 +172,8 @@ void UploadStore::sweep_until_stopped() {
   }
 }
 
-std::optional<Problem> UploadStore::check_room_locked(std::uint64_t length) const {
+std::optional<Problem> UploadStore::check_room_locked(const UploadRecord& record) const {
+  const std::uint64_t length = record.length;
   if (length > limits_.max_upload_file_bytes)
     return Problem{.kind = ProblemKind::kBodyTooLarge,
                    .detail = "the upload is larger than the server takes",
@@ -183,6 +184,24 @@ std::optional<Problem> UploadStore::check_room_locked(std::uint64_t length) cons
                    .detail = "the server holds as many uploads as it may",
                    .limit = static_cast<double>(limits_.max_uploads),
                    .actual = static_cast<double>(entries_.size())};
+  if (!record.owner.empty()) {
+    std::uint64_t count = 1;
+    std::uint64_t bytes = length;
+    for (const auto& item : entries_) {
+      if (item.second->record.owner != record.owner) continue;
+      ++count;
+      bytes += item.second->record.length;
+    }
+    const auto over = [](const char* what, std::uint64_t limit, std::uint64_t actual) {
+      return Problem{.kind = ProblemKind::kTooMany,
+                     .detail = std::string("the token's resumable uploads would exceed ").append(what),
+                     .limit = static_cast<double>(limit),
+                     .actual = static_cast<double>(actual)};
+    };
+    if (count > limits_.token_uploads) return over("token_uploads", limits_.token_uploads, count);
+    if (bytes > limits_.token_upload_file_bytes)
+      return over("token_upload_file_bytes", limits_.token_upload_file_bytes, bytes);
+  }
   // What others were promised is not free.
   std::uint64_t promised = 0;
   for (const auto& item : entries_) promised += item.second->record.length - item.second->offset;
@@ -203,7 +222,7 @@ Outcome<UploadStatus> UploadStore::create(UploadRecord record) {
   const std::string id = entry->record.id;
   {
     const std::lock_guard lock(mutex_);
-    if (auto problem = check_room_locked(entry->record.length)) return *problem;
+    if (auto problem = check_room_locked(entry->record)) return *problem;
     entries_.emplace(id, entry);
   }
   const Descriptor file = open_bytes(upload_bytes_path(folder_, id), O_RDWR | O_CREAT | O_EXCL);

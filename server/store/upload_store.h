@@ -117,7 +117,7 @@ class UploadStore {
   void remove_files(const std::string& id) const;
   void sweep();
   void sweep_until_stopped();
-  [[nodiscard]] std::optional<protocol::Problem> check_room_locked(std::uint64_t length) const;
+  [[nodiscard]] std::optional<protocol::Problem> check_room_locked(const UploadRecord& record) const;
 
   const Limits limits_;
   const std::string folder_;

@@ -421,6 +421,64 @@ TEST_CASE("quotas bound one token, with the limit in the answer, and nobody else
   CHECK(guarded.get(guarded.ann, "/v1/info").status == 200);
 }
 
+TEST_CASE("tokens are bounded, and so is each one's part of the resumable uploads") {
+  Guarded guarded({"--max-tokens", "5", "--token-uploads", "2", "--token-upload-file-bytes", "1000"});
+  const auto add = [&] {
+    return guarded.ask(guarded.root, "POST", "/v1/tokens", R"({"name":"E","scope":"view"})");
+  };
+  const Reply fifth = add();
+  CHECK(fifth.status == 201);
+  const Reply sixth = add();
+  CHECK(sixth.status == 429);
+  CHECK(sixth.json()["limit"] == 5);
+  CHECK(sixth.json()["detail"].get<std::string>().find("max_tokens") != std::string::npos);
+  CHECK(guarded.get(guarded.ann, "/v1/info").json()["limits"]["max_tokens"] == 5);
+  CHECK(guarded.ask(guarded.root, "DELETE", fifth.headers.at("location")).status == 204);
+  CHECK(add().status == 201);
+
+  const auto begin = [&](const std::string& token, int bytes) {
+    return guarded.ask(token, "POST", "/v1/uploads", "",
+                       "Tus-Resumable: 1.0.0\r\nUpload-Length: " + std::to_string(bytes) + "\r\n");
+  };
+  CHECK(begin(guarded.ann, 1001).status == 429);
+  const Reply first = begin(guarded.ann, 600);
+  CHECK(first.status == 201);
+  const Reply large = begin(guarded.ann, 401);
+  CHECK(large.status == 429);
+  CHECK(large.json()["limit"] == 1000);
+  CHECK(large.json()["actual"] == 1001);
+  CHECK(begin(guarded.ann, 1).status == 201);
+  const Reply third = begin(guarded.ann, 1);
+  CHECK(third.status == 429);
+  CHECK(third.json()["limit"] == 2);
+  CHECK(third.json()["detail"].get<std::string>().find("token_uploads") != std::string::npos);
+  CHECK(begin(guarded.bob, 600).status == 201);
+  CHECK(guarded.ask(guarded.ann, "DELETE", first.headers.at("location"), "", "Tus-Resumable: 1.0.0\r\n")
+            .status == 204);
+  CHECK(begin(guarded.ann, 999).status == 201);
+}
+
+TEST_CASE("a body that is refused by its head does not count for the day") {
+  Guarded guarded;
+  const std::string daily =
+      guarded.add("Daily", "edit", {"--upload-bytes-per-day", std::to_string(sheet().size() + 100)});
+  ::kill(guarded.daemon.pid(), SIGHUP);
+  for (int i = 0; i < 500 && guarded.get(daily, "/v1/info").status != 200; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  const auto used = [&] {
+    return guarded.get(daily, "/v1/info")
+        .json()["caller"]["quotas"]["upload_bytes_per_day"]["used"]
+        .get<int>();
+  };
+  CHECK(guarded.ask(daily, "POST", "/v1/clouds", sheet(), "Content-Type: text/html\r\n").status == 415);
+  CHECK(used() == 0);
+  CHECK(guarded.ask(daily, "POST", "/v1/clouds", sheet(), "Content-Type: application/x-ply\r\n").status ==
+        201);
+  CHECK(used() > 1000);
+  CHECK(guarded.ask(daily, "POST", "/v1/clouds", sheet(), "Content-Type: application/x-ply\r\n").status ==
+        429);
+}
+
 TEST_CASE("a file of tokens that others may read, and an open address, are refused") {
   TokenFile tokens;
   tokens.add("Ann", "edit");

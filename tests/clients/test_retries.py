@@ -72,6 +72,26 @@ class Retries(Served):
                 self.assertEqual(len(posts), changes)
                 self.assertEqual(len({post.headers["Idempotency-Key"] for post in posts}), 1)
 
+    def test_taking_an_edit_out_is_repeated_with_its_key_or_not_at_all(self):
+        for features, changes in (([], 1), (["idempotency-keys"], 2)):
+            with self.subTest(features):
+                asked = []
+
+                def handle(request):
+                    if request.path == "/v1/info":
+                        return document({"limits": {}, "features": features})
+                    asked.append(request)
+                    return None if len(asked) == 1 else document({"done": True})
+
+                _, client = self.serve(handle)
+                if features:
+                    client.request("DELETE", "/v1/sessions/s/edits/1", headers={"If-Match": "*"})
+                else:
+                    with self.assertRaises(Unreachable):
+                        client.request("DELETE", "/v1/sessions/s/edits/1", headers={"If-Match": "*"})
+                self.assertEqual(len(asked), changes)
+                self.assertEqual(len({request.headers["Idempotency-Key"] for request in asked}), 1)
+
     def test_other_refusals_are_not_repeated_and_pages_of_proxies_are_problems_too(self):
         fake, client = self.serve(lambda request: (502, {}, b"<h1>Bad gateway</h1>"))
         with self.assertRaises(ServerError) as caught:

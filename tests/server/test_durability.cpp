@@ -318,6 +318,106 @@ TEST_CASE("sessions that nobody asked for expire, those in use do not") {
   CHECK(service.get(used).status == 200);
 }
 
+TEST_CASE("clouds and images that nobody holds make room, and come back once somebody needs them") {
+  const TemporaryFolder folder;
+  std::vector<std::string> clouds;
+  std::uint64_t each = 0;
+  {
+    TestService service(lasting(folder));
+    clouds.push_back(service.upload());
+    each = service.service.clouds.memory().held();
+  }
+  Config config = lasting(folder);
+  config.limits.max_cloud_bytes = 2 * each + each / 2;
+  TestService service(config);
+  const auto data = [&](const std::string& cloud) {
+    return service.get("/v1/clouds/" + cloud + "/data?format=ply");
+  };
+  for (int i = 0; i < 3; ++i) {
+    clouds.push_back(service.upload());
+    CHECK(service.service.clouds.memory().held() <= config.limits.max_cloud_bytes);
+  }
+  for (const std::string& cloud : clouds) {
+    const Answer answer = data(cloud);
+    CHECK(answer.status == 200);
+    CHECK(answer.bytes == data(clouds.front()).bytes);
+    CHECK(service.service.clouds.memory().held() <= config.limits.max_cloud_bytes);
+  }
+  // Sessions hold theirs: what is left is not enough for a third one.
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string body = R"({"cloud":")" + clouds[i] + R"(","scales":[0.05]})";
+    REQUIRE(service.ask(Method::kPost, "/v1/sessions", body).status == 202);
+  }
+  const Answer refused = data(clouds[2]);
+  CHECK(refused.status == 503);
+  CHECK_FALSE(refused.header("Retry-After").empty());
+  CHECK(refused.body["limit"] == config.limits.max_cloud_bytes);
+  CHECK(data(clouds[0]).status == 200);
+  for (const json& session : sessions_of(service))
+    CHECK(service.ask(Method::kDelete, "/v1/sessions/" + session["id"].get<std::string>()).status == 204);
+  // Its strand may hold a session for a moment longer.
+  int status = 0;
+  for (int i = 0; i < 2000 && status != 200; ++i) {
+    status = data(clouds[2]).status;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  CHECK(status == 200);
+}
+
+TEST_CASE("a session that was not brought back for a passing reason is brought back when asked for later") {
+  const TemporaryFolder folder;
+  std::string path;
+  json document;
+  std::string committed;
+  {
+    TestService service(lasting(folder));
+    path = service.open_painted();
+    commit(service, path, edit(0.3));
+    document = without_timings(service.get(path).body);
+    committed = samples(service, path);
+  }
+  std::atomic<int> tries{0};
+  std::atomic<bool> is_short{true};
+  TestService service(lasting(folder), double_every_tenth, [&](auto&&... arguments) {
+    ++tries;
+    if (is_short) throw std::bad_alloc();
+    return build_hierarchy(std::forward<decltype(arguments)>(arguments)...);
+  });
+  const Answer failed = service.get(path);
+  CHECK(failed.body["state"] == "failed");
+  CHECK(service.ask(Method::kPost, path + "/edits", edit(0.1), if_match("*")).status == 409);
+  CHECK(tries >= 1);
+  is_short = false;
+  for (int i = 0; i < 100 && service.get(path).body["state"] != "ready"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  CHECK(without_timings(service.get(path).body) == document);
+  CHECK(samples(service, path) == committed);
+  commit(service, path, edit(0.1));
+}
+
+TEST_CASE("an edit that is taken out with a key is taken out once") {
+  const TemporaryFolder folder;
+  const std::vector<NameValue> key = {{"idempotency-key", "out"}, {"if-match", "*"}};
+  std::string path;
+  Answer first;
+  {
+    TestService service(lasting(folder));
+    path = service.open_painted();
+    for (const double z : {0.3, 0.2, 0.1}) commit(service, path, edit(z));
+    first = service.ask(Method::kDelete, path + "/edits/1", "", key);
+    REQUIRE(first.status == 200);
+    const Answer again = service.ask(Method::kDelete, path + "/edits/1", "", key);
+    CHECK(again.status == 200);
+    CHECK(again.bytes == first.bytes);
+    CHECK(again.header("Idempotency-Replayed") == "true");
+    CHECK(service.get(path + "/edits").body["edits"].size() == 2);
+    CHECK(service.ask(Method::kDelete, path + "/edits/2", "", key).status == 422);
+  }
+  TestService service(lasting(folder));
+  CHECK(service.ask(Method::kDelete, path + "/edits/1", "", key).bytes == first.bytes);
+  CHECK(service.get(path + "/edits").body["edits"].size() == 2);
+}
+
 TEST_CASE("a request with a key has one effect and one answer, here and after a restart") {
   const TemporaryFolder folder;
   const std::vector<NameValue> key = {{"idempotency-key", "one"}, {"if-match", "*"}};

@@ -43,13 +43,14 @@ struct Answer {
 
 /// A service whose decoder runs in this process.
 struct TestService {
-  explicit TestService(Config config = {}, Resampler resample = double_every_tenth)
+  explicit TestService(Config config = {}, Resampler resample = double_every_tenth,
+                       HierarchyBuilder build = build_hierarchy)
       : service(
             std::move(config),
             {.decode = [](std::span<const std::byte> bytes, CloudFormat format, const ImportParams& params,
                           const ExecutionContext*) { return decode_cloud(bytes, format, params); },
              .decode_image = [](std::span<const std::byte> bytes) { return read_png(bytes, {}); },
-             .build = build_hierarchy,
+             .build = std::move(build),
              .resample = std::move(resample),
              .assets = {}}) {
     notes = service.recover();

@@ -3,10 +3,14 @@
 #include <doctest/doctest.h>
 
 #include <sqlite3.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "server/base/sha256.h"
 #include "server/store/answers.h"
@@ -200,6 +204,41 @@ TEST_CASE("a blob is what was put, stays while it is used or pinned, and is put 
   CHECK(blobs.read(name).ok());
   blobs.drop(name, unused);
   CHECK_FALSE(blobs.read(name).ok());
+}
+
+TEST_CASE("nobody waits for a large blob that is being written, but who stores the same one") {
+  const TemporaryFolder temporary;
+  const DataFolder folder(temporary / "data");
+  BlobStore blobs(folder);
+  // Of another file system: it is copied, which takes its time.
+  constexpr std::uint64_t kBytes = 128ULL << 20U;
+  const Descriptor large(::memfd_create("large", MFD_CLOEXEC));
+  REQUIRE(::ftruncate(large.get(), kBytes) == 0);
+  Digest digest(Digest::Algorithm::kSha256);
+  const std::vector<std::byte> zeros(1U << 20U);
+  for (std::uint64_t done = 0; done < kBytes; done += zeros.size()) digest.add(zeros);
+  const std::string name = to_hex(digest.finish());
+  const std::string small = "all the samples";
+  std::atomic<int> writing{2};
+  const auto put_large = [&] {
+    CHECK(blobs.put(name, {large.get(), kBytes}).ok());
+    --writing;
+  };
+  std::thread first(put_large);
+  std::thread second(put_large);
+  int meanwhile = 0;
+  while (writing == 2) {
+    CHECK_FALSE(blobs.has_failed());
+    CHECK(blobs.put(sha256_hex(bytes_of(small)), bytes_of(small)).ok());
+    blobs.drop(sha256_hex(bytes_of(small)), [](const std::string&) { return false; });
+    if (writing == 2) ++meanwhile;
+  }
+  first.join();
+  second.join();
+  CHECK(meanwhile >= 2);
+  const auto back = blobs.open(name);
+  REQUIRE(back.ok());
+  CHECK(back.value()->size == kBytes);
 }
 
 TEST_CASE("marks come back from their runs, and nothing else comes from bytes that are none") {

@@ -15,6 +15,12 @@ using nlohmann::json;
 
 constexpr double kLongestPauseSeconds = 60.0;
 
+/// Whether the request, made a second time, may have a second effect.
+bool changes_once_more(const HttpRequest& request) {
+  return request.method == "POST" ||
+         (request.method == "DELETE" && request.path.find("/edits/") != std::string::npos);
+}
+
 bool is_overloaded(const HttpAnswer& answer) {
   return answer.status == 429 || answer.status == 503;
 }
@@ -77,7 +83,7 @@ RemoteService::RemoteService(const std::string& url, std::string token, std::str
 }
 
 HttpAnswer RemoteService::ask(HttpRequest request) const {
-  if (request.method == "POST") request.headers.emplace_back("Idempotency-Key", random_id());
+  if (changes_once_more(request)) request.headers.emplace_back("Idempotency-Key", random_id());
   for (int attempt = 0;; ++attempt) {
     HttpAnswer answer = http_.send(request);
     if (answer.status >= 200 && answer.status < 400) return answer;
@@ -115,7 +121,7 @@ bool RemoteService::has_feature(const std::string& name) const {
 bool RemoteService::may_repeat(const HttpRequest& request, const HttpAnswer& answer) const {
   if (request.write_body || answer.trouble == "cancelled") return false;
   if (!answer.was_sent) return true;
-  return request.method != "POST" || has_feature("idempotency-keys");
+  return !changes_once_more(request) || has_feature("idempotency-keys");
 }
 
 void RemoteService::pause(int attempt, const std::string& asked) const {

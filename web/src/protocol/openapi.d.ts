@@ -3185,6 +3185,8 @@ export interface operations {
             header: {
                 /** @description The revision that the change is made for, as the session's ETag says it; or * for any */
                 "If-Match": components["parameters"]["OwedIfMatch"];
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
             };
             path: {
                 session: components["parameters"]["SessionId"];
