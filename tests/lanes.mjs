@@ -1,4 +1,5 @@
-// The lanes of the test runner, in the order in which they run: quick ones first, then what needs the build.
+// The lanes of the test runner, in the order in which they run: quick ones first, then what needs the build. Tests wait for
+// each other more than they compute, so clang-tidy runs beside them.
 import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync } from "node:fs";
 import { basename, resolve } from "node:path";
 import { dependencies } from "./gates/dependencies.mjs";
@@ -127,6 +128,7 @@ export const lanes = [
   { name: "build", about: "everything in C++, warnings are errors", run: () => make("build-tests") },
   { name: "viewer", about: "the viewer's types and its build", run: () => make("viewer") },
   { name: "headers", about: "every header compiles alone", run: headers },
+  { name: "tidy", about: "clang-tidy", run: tidy, beside: true },
   { name: "cpp", about: "the C++ tests", run: cpp },
   { name: "web", about: "the viewer's unit tests", run: webUnit },
   { name: "clients", about: "clients: Python, command line, TypeScript", run: clients },
@@ -138,5 +140,4 @@ export const lanes = [
     run: () => nodeTests(/^tests\/web\/.*\.test\.(mjs|js)$/, "tests/web"),
   },
   { name: "battery", about: "hostile bytes, slow clients and load, in short", run: battery },
-  { name: "tidy", about: "clang-tidy", run: tidy },
 ];

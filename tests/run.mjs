@@ -3,7 +3,8 @@
 //   node tests/run.mjs [LANE...]      all lanes, or only the named ones
 //
 // A lane is {name, about, run}; run() answers {passed, failed, output}: how many test cases passed and failed, and what to
-// show when some failed. A gate counts as one test. Exit status: 0 only where something ran and nothing failed.
+// show when some failed. A gate counts as one test. A lane that is `beside` takes what the processors have left while those
+// after it run. Exit status: 0 only where something ran and nothing failed.
 import { mkdirSync, writeFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { lanes } from "./lanes.mjs";
@@ -35,9 +36,8 @@ if (unknown.length > 0) {
 }
 
 mkdirSync(logs, { recursive: true });
-const results = [];
-for (const lane of lanes.filter(({ name }) => wanted.length === 0 || wanted.includes(name))) {
-  console.log(`--- ${lane.name}: ${lane.about}`);
+/** Runs a lane, shows what failed, and answers what it came to. */
+async function runLane(lane) {
   const start = Date.now();
   let result;
   try {
@@ -49,9 +49,19 @@ for (const lane of lanes.filter(({ name }) => wanted.length === 0 || wanted.incl
   const log = resolve(logs, `${lane.name}.log`);
   writeFileSync(log, result.output);
   if (result.failed > 0) show(result.output, log);
-  console.log(`    ${result.failed > 0 ? "FAILED" : "ok"} in ${seconds.toFixed(1)} s`);
-  results.push({ name: lane.name, seconds, ...result });
+  const which = lane.beside ? `${lane.name} ` : "";
+  console.log(`    ${which}${result.failed > 0 ? "FAILED" : "ok"} in ${seconds.toFixed(1)} s`);
+  return { name: lane.name, seconds, ...result };
 }
+
+const running = [];
+for (const lane of lanes.filter(({ name }) => wanted.length === 0 || wanted.includes(name))) {
+  console.log(`--- ${lane.name}: ${lane.about}${lane.beside ? " (beside what follows)" : ""}`);
+  const outcome = runLane(lane);
+  if (!lane.beside) await outcome;
+  running.push(outcome);
+}
+const results = await Promise.all(running);
 
 const row = (name, passed, failed, seconds) =>
   console.log(
