@@ -941,23 +941,40 @@ class Client:
     def submit_job(
         self,
         *,
-        cloud: Union[str, "Cloud", None] = None,
         recipe: Optional[Document] = None,
         session: Union[str, "Session", None] = None,
-        output: Optional[Document] = None,
+        cloud: Union[str, "Cloud", None] = None,
+        upload: Optional[str] = None,
+        preview: Union[int, str, "Cloud", None] = None,
+        format: Optional[str] = None,  # noqa: A002
+        mode: Optional[str] = None,
+        s: Optional[float] = None,
+        timing: Optional[str] = None,
+        name: Optional[str] = None,
+        priority: Optional[int] = None,
         launcher: Optional[str] = None,
-        validate: Optional[bool] = None,
     ) -> "Job":
-        """Submits a job: the edits of a recipe or of a session, on a cloud at full resolution."""
-        if (recipe is None) == (session is None):
-            raise ValueError("one of recipe and session")
-        body = _given(
-            cloud=cloud.id if isinstance(cloud, Cloud) else cloud, recipe=recipe,
-            session=session.id if isinstance(session, Session) else session, output=output, launcher=launcher,
-            validate=validate,
-        )  # fmt: skip
+        """Submits a job: the edits of a session or of a recipe, at full resolution on a cloud or on a complete resumable
+        upload (its id); on the session's own cloud where neither is given.
+
+        preview: beside a recipe, the cloud that was edited, or how many of the scan's samples stand in for it
+        format: of the result: ply, las, draco or xyz; that of the scan where it is not given
+        mode: tiles (bounded memory), memory or direct; tiles where that can be, where it is not given
+        """
+        body = _job_body(recipe, session, cloud, upload, preview, format, mode, s, timing, name, priority, launcher)
         response = self._job_request("POST", "/v1/jobs", json=body)
         return Job(self, response.json(), response.headers.get("Location"))
+
+    def validate_job(self, **terms: Any) -> Document:
+        """What a job would take, with the arguments of submit_job(): mode, samples, memory, disk, seconds."""
+        arguments = ("recipe", "session", "cloud", "upload", "preview", "format", "mode", "s", "timing", "name",
+                     "priority", "launcher")  # fmt: skip
+        unknown = set(terms) - set(arguments)
+        if unknown:
+            raise TypeError(f"validate_job() takes no {', '.join(sorted(unknown))}")
+        body = {**_job_body(*(terms.get(argument) for argument in arguments)), "validate": True}
+        estimate: Document = self._job_request("POST", "/v1/jobs", json=body).json()["estimate"]
+        return estimate
 
     def _job_request(self, method: str, path: str, **options: Any) -> requests.Response:
         try:
@@ -966,6 +983,37 @@ class Client:
             if problem.status == 405 or (isinstance(problem, NotFound) and not self.has_feature("jobs")):
                 raise NotSupported({**problem.document, "detail": "This server has no jobs"}) from problem
             raise
+
+
+def _job_body(
+    recipe: Optional[Document],
+    session: Union[str, "Session", None],
+    cloud: Union[str, "Cloud", None],
+    upload: Optional[str],
+    preview: Union[int, str, "Cloud", None],
+    format: Optional[str],  # noqa: A002
+    mode: Optional[str],
+    s: Optional[float],
+    timing: Optional[str],
+    name: Optional[str],
+    priority: Optional[int],
+    launcher: Optional[str],
+) -> Document:
+    """POST /v1/jobs"""
+    if (recipe is None) == (session is None):
+        raise ValueError("one of recipe and session")
+
+    def identity(thing: Any) -> Any:
+        return thing.id if isinstance(thing, (Cloud, Session)) else thing
+
+    seen: Optional[Document] = None
+    if preview is not None:
+        seen = {"count": preview} if isinstance(preview, int) else {"cloud": identity(preview)}
+    return _given(
+        recipe=recipe, session=identity(session), cloud=identity(cloud), upload=upload, preview=seen,
+        output=None if format is None else {"format": format}, mode=mode, s=s, timing=timing, name=name,
+        priority=priority, launcher=launcher,
+    )  # fmt: skip
 
 
 def _path(location: str) -> str:
@@ -1530,8 +1578,7 @@ class Job:
     def __init__(self, client: Client, document: Document, location: Optional[str] = None) -> None:
         self.client = client
         self.document = document
-        identity = document.get("jobID") or document.get("id")
-        self.id: str = str(identity or _path(location or "").rsplit("/", 1)[-1])
+        self.id: str = str(document.get("jobID") or _path(location or "").rsplit("/", 1)[-1])
         self._path = f"/v1/jobs/{self.id}"
 
     def __repr__(self) -> str:
@@ -1583,5 +1630,17 @@ class Job:
         return self
 
     def results(self) -> Document:
-        """What the job made."""
-        return self.client.request("GET", f"{self._path}/results").json()
+        """What the job made: "results", each with name, type, bytes, sha256 and href; and the worker's "report"."""
+        results: Document = self.client.request("GET", f"{self._path}/results").json()
+        return results
+
+    def download(self, target: Union[str, "os.PathLike[str]"], name: Optional[str] = None) -> int:
+        """Writes a file that the job made, the first one where no name is given; returns its bytes."""
+        for result in self.results()["results"]:
+            if name is None or result["name"] == name:
+                return _save(self.client.request("GET", result["href"], stream=True), target)
+        raise ValueError(f"the job has made no {name or 'file'}")
+
+    def delete(self) -> None:
+        """Forgets a job that has ended, with its results."""
+        self.client.request("DELETE", self._path)

@@ -29,6 +29,7 @@ struct Quotas {
   std::optional<std::uint64_t> upload_bytes_per_day = std::nullopt;
   std::optional<std::uint64_t> streams = std::nullopt;
   std::optional<std::uint64_t> requests_per_second = std::nullopt;
+  std::optional<std::uint64_t> jobs = std::nullopt;  ///< that wait or run
   friend bool operator==(const Quotas&, const Quotas&) = default;
 };
 
@@ -44,6 +45,7 @@ inline constexpr std::array kQuotas = {
     QuotaInfo{"upload_bytes_per_day", &Quotas::upload_bytes_per_day},
     QuotaInfo{"streams", &Quotas::streams},
     QuotaInfo{"requests_per_second", &Quotas::requests_per_second},
+    QuotaInfo{"jobs", &Quotas::jobs},
 };
 
 /// POST /v1/tokens

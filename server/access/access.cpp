@@ -28,7 +28,8 @@ constexpr double kDay = 86'400.0;
 constexpr std::array<std::uint64_t Limits::*, kQuotaCount> kDefaults = {
     &Limits::token_sessions,     &Limits::token_samples,
     &Limits::token_stored_bytes, &Limits::token_upload_bytes_per_day,
-    &Limits::token_streams,      &Limits::token_requests_per_second};
+    &Limits::token_streams,      &Limits::token_requests_per_second,
+    &Limits::token_jobs};
 
 Problem unauthorized(std::string detail) {
   return Problem{.kind = ProblemKind::kUnauthorized, .detail = std::move(detail)};

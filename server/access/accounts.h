@@ -13,7 +13,15 @@
 namespace pointwright::server {
 
 /// In the order of protocol::kQuotas.
-enum class Quota { kSessions, kSamples, kStoredBytes, kUploadBytesPerDay, kStreams, kRequestsPerSecond };
+enum class Quota {
+  kSessions,
+  kSamples,
+  kStoredBytes,
+  kUploadBytesPerDay,
+  kStreams,
+  kRequestsPerSecond,
+  kJobs
+};
 inline constexpr std::size_t kQuotaCount = protocol::kQuotas.size();
 
 /// A part of a quota, given back with the last copy.

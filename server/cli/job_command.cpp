@@ -1,5 +1,7 @@
 #include "server/cli/job_command.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -7,6 +9,7 @@
 #include <iomanip>
 #include <iostream>
 #include <limits>
+#include <new>
 #include <string_view>
 #include <utility>
 
@@ -15,6 +18,7 @@
 #include "protocol/json/parse.h"
 #include "server/cli/local_file.h"
 #include "server/ingest/files.h"
+#include "server/ingest/sandbox.h"
 #include "server/jobs/full_resolution.h"
 
 namespace pointwright::server {
@@ -23,10 +27,24 @@ namespace {
 constexpr std::uint64_t kMostRecipeBytes = std::uint64_t{1} << 30U;
 constexpr std::array<std::string_view, 3> kModeNames{"tiles", "memory", "direct"};
 
-int refuse(std::ostream& err, const std::string& what, int status) {
-  err << "pointwright: " << what << "\n";
-  return status;
-}
+/// Says why the job cannot be done; for events as a document, too.
+class Refusal {
+ public:
+  Refusal(std::ostream& out, std::ostream& err, bool events) : out_(out), err_(err), events_(events) {}
+  int operator()(const std::string& what, int status) const {
+    return (*this)(protocol::Problem{.kind = protocol::ProblemKind::kInvalidValue, .detail = what}, status);
+  }
+  int operator()(const protocol::Problem& problem, int status) const {
+    err_ << "pointwright: " << problem.detail << "\n";
+    if (events_) out_ << protocol::to_text({{"problem", protocol::to_json(problem)}}) << std::endl;
+    return status;
+  }
+
+ private:
+  std::ostream& out_;
+  std::ostream& err_;
+  const bool events_;
+};
 
 /// {"format": …} is a recipe, {"recipe": …} a request with one.
 protocol::Parsed<protocol::RecipeRequest> parse_recipe_file(std::string_view text) {
@@ -41,15 +59,22 @@ protocol::Parsed<protocol::RecipeRequest> parse_recipe_file(std::string_view tex
   return protocol::parse_recipe_request(request);
 }
 
-/// A line that is written over and over, at most ten times a second.
+enum class Telling { kNothing, kLine, kEvents };
+
+/// A line that is written over and over, or one event after the other, at most ten times a second.
 class ProgressLine {
  public:
-  ProgressLine(std::ostream& err, bool quiet) : err_(err), quiet_(quiet) {}
+  ProgressLine(std::ostream& err, Telling telling) : err_(err), telling_(telling) {}
   void show(const std::string& phase, double fraction) {
     const auto now = std::chrono::steady_clock::now();
-    if (quiet_ || (phase == phase_ && now - last_ < std::chrono::milliseconds(100))) return;
+    if (telling_ == Telling::kNothing || (phase == phase_ && now - last_ < std::chrono::milliseconds(100)))
+      return;
     last_ = now;
     phase_ = phase;
+    if (telling_ == Telling::kEvents) {
+      err_ << protocol::to_text({{"phase", phase}, {"fraction", fraction}}) << std::endl;
+      return;
+    }
     const double elapsed = std::chrono::duration<double>(now - begin_).count();
     err_ << "\r\033[K" << std::setw(3) << static_cast<int>(100.0 * fraction) << " %  " << phase;
     if (fraction > 0.2 && fraction < 1.0)
@@ -60,7 +85,7 @@ class ProgressLine {
 
  private:
   std::ostream& err_;
-  const bool quiet_;
+  const Telling telling_;
   const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point last_;
   std::string phase_;
@@ -80,6 +105,45 @@ protocol::JsonDocument to_json(const JobReport& report, double seconds) {
             {"max_difference", report.max_difference}}},
           {"spacing", report.spacing},
           {"seconds", seconds}};
+}
+
+protocol::JsonDocument to_json(const JobEstimate& estimate) {
+  return {{"mode", kModeNames[static_cast<std::size_t>(estimate.mode)]},
+          {"sample_count", estimate.samples},
+          {"memory_bytes", estimate.memory_bytes},
+          {"disk_bytes", estimate.disk_bytes},
+          {"free_disk_bytes", estimate.free_disk_bytes},
+          {"seconds", estimate.seconds}};
+}
+
+/// More memory than that is refused: it is then told of, where the system would just end the process.
+void bound_memory(std::uint64_t bytes) {
+  const rlimit limit{.rlim_cur = bytes, .rlim_max = bytes};
+  if (bytes > 0 && !kSanitizedBuild) static_cast<void>(::setrlimit(RLIMIT_DATA, &limit));
+}
+
+/// Runs work() -> Outcome<T> with so many threads; memory that is not there is a problem like others.
+template <typename Work>
+auto with_memory(int threads, Work work) -> decltype(work()) {
+  decltype(work()) outcome = protocol::Problem{
+      .kind = protocol::ProblemKind::kOutOfSpace,
+      .detail =
+          "there is not enough memory for this job in this mode; in tiles it takes as much as it is given"};
+  try {
+    with_threads(threads, [&] { outcome = work(); });
+  } catch (const std::bad_alloc&) {
+  }
+  return outcome;
+}
+
+void tell(std::ostream& out, const JobEstimate& estimate) {
+  constexpr double kMebi = 1024.0 * 1024.0;
+  out << "samples     " << estimate.samples << "\nmode        "
+      << kModeNames[static_cast<std::size_t>(estimate.mode)] << "\nmemory      "
+      << static_cast<double>(estimate.memory_bytes) / kMebi << " MiB\ndisk        "
+      << static_cast<double>(estimate.disk_bytes) / kMebi << " MiB, of "
+      << static_cast<double>(estimate.free_disk_bytes) / kMebi << " MiB that are free\ntime        about "
+      << estimate.seconds << " s\n";
 }
 
 }  // namespace
@@ -115,12 +179,22 @@ CLI::App* add_job_run(CLI::App& group, JobRunOptions& options) {
       "--work", options.work,
       "folder for scratch files, from which an interrupted job goes on; else beside the result");
   command->add_option("--threads", options.threads, "at most so many; 0: all")->check(CLI::Range(0, 1024));
+  command->add_flag("--dry-run", options.dry_run, "say what it would take, and do nothing");
+  command->add_option("--most-memory", options.most_mebibytes, "MiB beyond which memory is refused; 0: none")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 30U));
+  command->add_flag("--drop-non-finite", options.drop_non_finite,
+                    "leave out samples that are not finite; not in tiles");
+  command->add_flag("--confined", options.confined, "decode the scan in a process that may do nothing else");
+  command->add_flag("--events", options.events,
+                    "JSON documents, one a line: progress, and in the end the report or the problem");
   command->add_flag("--json", options.json, "the report as a JSON document");
   command->add_flag("--quiet", options.quiet, "no progress");
   return command;
 }
 
 int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) {
+  const Refusal refuse(out, err, options.events);
+  bound_memory(options.most_mebibytes << 20U);
   JobParams params;
   params.input = options.input;
   params.output = options.output;
@@ -130,36 +204,57 @@ int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) 
   params.memory_bytes = options.memory_mebibytes << 20U;
   if (!options.mode.empty()) {
     const auto mode = std::find(kModeNames.begin(), kModeNames.end(), options.mode);
-    if (mode == kModeNames.end()) return refuse(err, "--mode is tiles, memory or direct", 2);
+    if (mode == kModeNames.end()) return refuse("--mode is tiles, memory or direct", 2);
     params.mode = static_cast<JobMode>(mode - kModeNames.begin());
   }
   auto text = read_file(options.recipe, kMostRecipeBytes);
-  if (!text) return refuse(err, options.recipe + ": " + text.error().message, 1);
+  if (!text) return refuse(options.recipe + ": " + text.error().message, 1);
   auto request = parse_recipe_file({reinterpret_cast<const char*>(text.value().data()), text.value().size()});
-  if (!request.ok()) return refuse(err, options.recipe + ": " + request.errors().summary(), 1);
+  if (!request.ok()) return refuse(options.recipe + ": " + request.errors().summary(), 1);
   params.request = std::move(request).value();
-  if (options.s && !(*options.s >= 0.0 && *options.s <= 1.0))
-    return refuse(err, "--s lies between 0 and 1", 2);
+  if (options.s && !(*options.s >= 0.0 && *options.s <= 1.0)) return refuse("--s lies between 0 and 1", 2);
   params.request.s = options.s.value_or(params.request.s);
   if (!options.timing.empty())
     params.request.timing = options.timing == protocol::kTimingNames[1] ? protocol::Timing::kTogether
                                                                         : protocol::Timing::kSequence;
   if (!options.preview.empty()) {
     auto preview = read_local_cloud(options.preview, {}, std::numeric_limits<std::uint64_t>::max());
-    if (!preview) return refuse(err, options.preview + ": " + preview.error().message, 1);
+    if (!preview) return refuse(options.preview + ": " + preview.error().message, 1);
     params.preview = std::make_shared<const Cloud>(std::move(preview.value().cloud));
   }
-  ProgressLine line(err, options.quiet || options.json);
+  params.confined = options.confined;
+  params.most_bytes = options.most_mebibytes << 20U;
+  params.drop_non_finite = options.drop_non_finite;
+  if (options.dry_run) {
+    const auto estimate =
+        with_memory(options.threads, [&] { return estimate_full_resolution(params, ExecutionContext()); });
+    if (!estimate.ok()) return refuse(estimate.problem(), 1);
+    const protocol::JsonDocument document = to_json(estimate.value());
+    if (options.events)
+      out << protocol::to_text({{"estimate", document}}) << std::endl;
+    else if (options.json)
+      out << protocol::to_text(document) << "\n";
+    else
+      tell(out, estimate.value());
+    return 0;
+  }
+  const bool is_silent = options.quiet || options.json;
+  ProgressLine line(options.events ? out : err, options.events ? Telling::kEvents
+                                                : is_silent    ? Telling::kNothing
+                                                               : Telling::kLine);
   const auto begin = std::chrono::steady_clock::now();
-  Outcome<JobReport> outcome = JobReport{};
-  with_threads(options.threads, [&] {
-    outcome = run_full_resolution(params, ExecutionContext(), [&](const std::string& phase, double fraction) {
+  const auto outcome = with_memory(options.threads, [&] {
+    return run_full_resolution(params, ExecutionContext(), [&](const std::string& phase, double fraction) {
       line.show(phase, fraction);
     });
   });
-  if (!outcome.ok()) return refuse(err, outcome.problem().detail, 1);
+  if (!outcome.ok()) return refuse(outcome.problem(), 1);
   const JobReport& report = outcome.value();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (options.events) {
+    out << protocol::to_text({{"report", to_json(report, seconds)}}) << std::endl;
+    return 0;
+  }
   if (options.json) {
     out << protocol::to_text(to_json(report, seconds)) << "\n";
     return 0;

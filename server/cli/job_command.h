@@ -22,6 +22,11 @@ struct JobRunOptions {
   std::uint64_t memory_mebibytes = 1024;
   std::string work;  ///< a folder for scratch files; empty: beside the output
   int threads = 0;   ///< 0: all
+  bool dry_run = false;
+  std::uint64_t most_mebibytes = 0;  ///< beyond which the system refuses this process memory; 0: none
+  bool drop_non_finite = false;
+  bool confined = false;  ///< decode the scan in a process that may do nothing else
+  bool events = false;    ///< one JSON document a line: progress, and in the end the report or the problem
   bool json = false;
   bool quiet = false;
 };

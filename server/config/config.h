@@ -19,6 +19,14 @@ struct SampleFile {
   friend bool operator==(const SampleFile&, const SampleFile&) = default;
 };
 
+/// What starts the workers of jobs elsewhere or several at once, such as mpirun or srun.
+struct Launcher {
+  std::string name;
+  std::vector<std::string> command;  ///< words, of which kWorkerPlace stands for the worker and its options
+  friend bool operator==(const Launcher&, const Launcher&) = default;
+};
+inline constexpr const char* kWorkerPlace = "{worker}";
+
 struct Config {
   std::string host = "127.0.0.1";
   std::uint16_t port = 7878;  ///< 0: any free one
@@ -33,6 +41,8 @@ struct Config {
   std::string tls_key;                     ///< its key, PEM
   std::string web_root;                    ///< the viewer's files; empty: none are served
   std::vector<SampleFile> samples;
+  std::string worker;  ///< the program `pointwright`, which does jobs; empty: the one beside the daemon
+  std::vector<Launcher> launchers;
   std::string log_level = "info";  ///< trace, debug, info, warn, error or off
   std::string log_file;            ///< empty: standard error
   std::uint32_t threads = 0;       ///< for computing; 0: all of the machine's

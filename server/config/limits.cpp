@@ -92,6 +92,15 @@ constexpr std::array kTable = {
     LimitInfo{"token_upload_file_bytes", &Limits::token_upload_file_bytes, 0, kTebi,
               "bytes of one token's resumable uploads together, as they are announced"},
     LimitInfo{"max_tokens", &Limits::max_tokens, 1, 10'000, "tokens, those that have expired included"},
+    LimitInfo{"max_jobs", &Limits::max_jobs, 1, 100'000, "jobs held at once, those that have ended included"},
+    LimitInfo{"max_running_jobs", &Limits::max_running_jobs, 1, 64, "jobs that run at once"},
+    LimitInfo{"job_tile_bytes", &Limits::job_tile_bytes, 64ULL << 20U, kTebi,
+              "memory that a job in tiles keeps to"},
+    LimitInfo{"max_job_bytes", &Limits::max_job_bytes, 64ULL << 20U, kTebi,
+              "memory beyond which a job's worker is refused more"},
+    LimitInfo{"job_retention_s", &Limits::job_retention_s, 0, 1'000'000'000,
+              "time after which a job that has ended is deleted with its results, seconds; 0: never"},
+    LimitInfo{"token_jobs", &Limits::token_jobs, 0, 100'000, "jobs of one token that wait or run"},
 };
 
 }  // namespace

@@ -60,6 +60,12 @@ struct Limits {
   std::uint64_t token_uploads = 16;
   std::uint64_t token_upload_file_bytes = 32ULL << 30U;
   std::uint64_t max_tokens = 1000;
+  std::uint64_t max_jobs = 200;
+  std::uint64_t max_running_jobs = 1;
+  std::uint64_t job_tile_bytes = 1ULL << 30U;
+  std::uint64_t max_job_bytes = 8ULL << 30U;
+  std::uint64_t job_retention_s = 7ULL * 86'400ULL;
+  std::uint64_t token_jobs = 8;
   friend bool operator==(const Limits&, const Limits&) = default;
 };
 

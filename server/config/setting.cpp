@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <sstream>
 #include <stdexcept>
+
+#include "protocol/json/jobs.h"
 
 namespace pointwright::server {
 namespace {
@@ -116,6 +119,50 @@ Setting samples_setting() {
               }};
 }
 
+Launcher parse_launcher(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  Launcher launcher{.name = text.substr(0, equals), .command = {}};
+  std::istringstream words(equals == std::string::npos ? std::string() : text.substr(equals + 1));
+  for (std::string word; words >> word;) launcher.command.push_back(word);
+  const bool has_place =
+      std::count(launcher.command.begin(), launcher.command.end(), std::string(kWorkerPlace)) == 1;
+  const bool is_name =
+      !launcher.name.empty() && std::all_of(launcher.name.begin(), launcher.name.end(), [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
+      });
+  if (!is_name || !has_place || launcher.name == protocol::kLocalLauncher)
+    throw std::invalid_argument(
+        "\"" + text +
+        "\" is not NAME=COMMAND with {worker} in it, such as \"two=mpirun -n 2 {worker}\"; "
+        "names are of a-z, 0-9 and -, and local is taken");
+  return launcher;
+}
+
+Setting launchers_setting() {
+  return {.key = "launcher",
+          .meaning =
+              "NAME=COMMAND that starts the workers of jobs, with {worker} where the worker's words go; may "
+              "be given "
+              "more than once",
+          .is_list = true,
+          .set =
+              [](Config& c, const std::vector<std::string>& v) {
+                c.launchers.clear();
+                for (const std::string& text : v) c.launchers.push_back(parse_launcher(text));
+              },
+          .get =
+              [](const Config& c) {
+                std::vector<std::string> values;
+                for (const Launcher& launcher : c.launchers) {
+                  std::string text = launcher.name + "=";
+                  for (const std::string& word : launcher.command)
+                    text += (text.back() == '=' ? "" : " ") + word;
+                  values.push_back(text);
+                }
+                return values;
+              }};
+}
+
 Setting allowed_hosts_setting() {
   return {.key = "allowed_hosts",
           .meaning = "host name to answer for besides loopback's; may be given more than once",
@@ -199,6 +246,10 @@ std::vector<Setting> all_settings() {
       text_setting("web", &Config::web_root,
                    "folder with the viewer's files; none are served where it is not given"),
       samples_setting(),
+      text_setting(
+          "worker", &Config::worker,
+          "the program pointwright, which does jobs; where it is not given, the one beside the daemon"),
+      launchers_setting(),
       log_level_setting(),
       text_setting("log_file", &Config::log_file, "file to log to; standard error where none is given"),
       {.key = "threads",

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "engine/io/columns.h"
+#include "server/base/file_types.h"
 #include "server/base/sha256.h"
 
 namespace pointwright::server {
@@ -26,9 +27,10 @@ Problem no_room(const Service& service) {
 }
 
 CloudFormat kind_of(const Format& format) {
-  if (format.name == "draco") return CloudFormat::kDraco;
-  if (format.name == "las") return CloudFormat::kLas;
-  return format.name == "xyz" ? CloudFormat::kXyz : CloudFormat::kPly;
+  const auto* const type = std::find_if(kFileTypes.begin(), kFileTypes.end(), [&](const FileType& each) {
+    return each.media_type == format.media_type;
+  });
+  return type == kFileTypes.end() ? CloudFormat::kPly : type->format;
 }
 
 Outcome<SharedFile> write_file(Service& service, const std::function<std::shared_ptr<const Cloud>()>& make,
@@ -60,10 +62,13 @@ Outcome<SharedFile> write_file(Service& service, const std::function<std::shared
 }  // namespace
 
 const std::vector<Format>& cloud_file_formats() {
-  static const std::vector<Format> formats = {{"ply", "application/x-ply", ".ply"},
-                                              {"draco", "model/x-draco", ".drc"},
-                                              {"xyz", "text/plain; charset=utf-8", ".xyz"},
-                                              {"las", "application/vnd.las", ".las"}};
+  static const std::vector<Format> formats = [] {
+    std::vector<Format> all;
+    for (const FileType& type : kFileTypes)
+      all.push_back(
+          {.name = format_name(type.format), .media_type = type.media_type, .extension = type.extension});
+    return all;
+  }();
   return formats;
 }
 

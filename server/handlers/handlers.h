@@ -36,6 +36,16 @@ Response delete_cloud(Service& service, const Request& request);
 Response list_imports(Service& service, const Request& request);
 Response get_import(Service& service, const Request& request);
 Response delete_import(Service& service, const Request& request);
+// jobs.cpp
+Response list_jobs(Service& service, const Request& request);
+Response create_job(Service& service, const Request& request);
+Response get_job(Service& service, const Request& request);
+Response delete_job(Service& service, const Request& request);
+Response restart_job(Service& service, const Request& request);
+Response get_job_log(Service& service, const Request& request);
+Response get_job_results(Service& service, const Request& request);
+Response get_job_result(Service& service, const Request& request);
+Response get_job_events(Service& service, const Request& request);
 // uploads.cpp
 Response list_uploads(Service& service, const Request& request);
 Response create_upload(Service& service, const Request& request);

@@ -15,6 +15,7 @@ Response get_service(Service& service, const Request& request) {
                           {"clouds", "/v1/clouds"},
                           {"images", "/v1/images"},
                           {"imports", "/v1/imports"},
+                          {"jobs", "/v1/jobs"},
                           {"sessions", "/v1/sessions"},
                           {"health", "/healthz"},
                           {"readiness", "/readyz"},
@@ -47,7 +48,7 @@ Response get_info(Service& service, const Request& request) {
       .formats = {"draco", "ply", "xyz", "las", "pcd", "obj"},
       .features = {"preview-stream", "undo", "single-resolution", "images", "model-regions",
                    "visible-outlines", "recipes", "partial-play", "resampling", "amend", "idempotency-keys",
-                   "tus", "tokens", "shares", "previews", "named-regions", "imports"},
+                   "tus", "tokens", "shares", "previews", "named-regions", "imports", "jobs"},
       .caller = protocol::to_json(service.access.describe(request.caller))};
   for (const LimitInfo& limit : limit_table())
     info.limits.emplace_back(std::string(limit.name), service.config.limits.*limit.member);

@@ -38,6 +38,17 @@ void add_sessions(const Service& service, std::vector<Gauge>& gauges) {
                     .value = samples});
 }
 
+void add_jobs(const Service& service, std::vector<Gauge>& gauges) {
+  std::array<double, protocol::kJobStatusNames.size()> counts{};
+  for (const protocol::JobDocument& job : service.jobs.list([](const std::string&) { return true; }))
+    counts.at(static_cast<std::size_t>(job.status)) += 1.0;
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    gauges.push_back({.name = "pointwright_jobs",
+                      .help = "Jobs by status.",
+                      .labels = std::string("status=\"").append(protocol::kJobStatusNames.at(i)).append("\""),
+                      .value = counts.at(i)});
+}
+
 }  // namespace
 
 Response get_metrics(Service& service, const Request&) {
@@ -52,6 +63,7 @@ Response get_metrics(Service& service, const Request&) {
   add("pointwright_clouds", "Clouds that are held.", static_cast<double>(service.clouds.list().size()));
   add("pointwright_images", "Images that are held.", static_cast<double>(service.images.list().size()));
   add_sessions(service, gauges);
+  add_jobs(service, gauges);
   constexpr std::string_view kWaiting = "Tasks that wait for a thread of the pool.";
   add("pointwright_pool_waiting", kWaiting, static_cast<double>(service.interactive.waiting()),
       "pool=\"interactive\"");

@@ -1,8 +1,6 @@
-#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "server/handlers/cloud_file.h"
@@ -12,30 +10,6 @@
 #include "server/sessions/recipes.h"
 
 namespace pointwright::server {
-namespace {
-
-/// A recipe names no region of a session: it holds them as volumes.
-std::optional<Problem> check_volumes(const std::vector<protocol::RecipeEdit>& edits) {
-  for (std::size_t i = 0; i < edits.size(); ++i) {
-    for (const auto& [name, operations] :
-         {std::pair("/zero", &edits[i].zero), std::pair("/one", &edits[i].one)}) {
-      const auto named = std::ranges::find_if(*operations, [](const PaintOperation& operation) {
-        return has_shape(operation.mode) && std::holds_alternative<RegionShape>(operation.shape);
-      });
-      if (named == operations->end()) continue;
-      const auto place = std::to_string(named - operations->begin());
-      return Problem{.kind = ProblemKind::kInvalidValue,
-                     .detail = "a recipe names no regions",
-                     .errors = {{.pointer = "/recipe/edits/" + std::to_string(i) + name + "/operations/" +
-                                            place + "/shape/type",
-                                 .detail = "the regions of a session are not in a recipe"}}};
-    }
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
 Response get_recipe(Service& service, const Request& request) {
   const auto session = session_of(service, request);
   if (!session.ok()) return problem_response(session.problem(), request);
@@ -64,7 +38,7 @@ Response post_recipe(Service& service, const Request& request) {
   auto recipe = parsed_body(request, protocol::parse_recipe_request, large_limits(service));
   if (!recipe.ok()) return problem_response(recipe.problem(), request);
   std::vector<protocol::RecipeEdit>& edits = recipe.value().recipe.edits;
-  if (auto problem = check_volumes(edits)) return problem_response(*problem, request);
+  if (auto problem = check_volumes(edits, false)) return problem_response(*problem, request);
   for (std::size_t i = 0; i < edits.size(); ++i) {
     const std::string pointer = "/recipe/edits/" + std::to_string(i);
     for (const auto& [name, operations] :

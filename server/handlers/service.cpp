@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <filesystem>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include "server/base/sha256.h"
@@ -14,6 +16,14 @@ namespace {
 std::size_t pool_threads(const Config& config) {
   const std::size_t machine = config.threads > 0 ? config.threads : std::thread::hardware_concurrency();
   return std::max<std::size_t>(machine, 2);
+}
+
+/// The program that does jobs: the one of the settings, or the one that is installed with the daemon.
+std::string worker_program(const Config& config) {
+  if (!config.worker.empty()) return config.worker;
+  std::error_code none;
+  const auto self = std::filesystem::read_symlink("/proc/self/exe", none);
+  return (self.parent_path() / "pointwright").string();
 }
 
 }  // namespace
@@ -49,6 +59,12 @@ Service::Service(Config settings, ServiceParts parts)
       answer_memory(config.limits.max_answer_memory),
       streams(config.limits.max_streams),
       imports(config.limits, parts.report_failure),
+      jobs({.folder = folder.jobs(),
+            .worker = worker_program(config),
+            .launchers = config.launchers,
+            .threads = config.threads,
+            .limits = config.limits},
+           database, parts.report_failure),
       is_ready(archive == nullptr) {}
 
 std::vector<std::string> Service::recover() {
@@ -77,6 +93,9 @@ std::vector<std::string> Service::recover() {
       if (session.damage) notes.push_back("session " + session.id + " is not served: " + *session.damage);
     sessions.restore(std::move(kept));
     if (damaged == 0) archive->sweep();
+    for (std::string& note :
+         jobs.recover([this](const std::string& owner) { return access.hold_again(owner, Quota::kJobs, 1); }))
+      notes.push_back(std::move(note));
   } catch (const DatabaseError& error) {
     throw std::runtime_error(std::string("the database cannot be read: ") + error.what());
   }

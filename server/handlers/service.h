@@ -15,6 +15,7 @@
 #include "server/http/message.h"
 #include "server/http/problem_response.h"
 #include "server/metrics/metrics.h"
+#include "server/queue/job_queue.h"
 #include "server/sessions/compute_pool.h"
 #include "server/store/answers.h"
 #include "server/store/archive.h"
@@ -72,6 +73,7 @@ class Service {
   Budget answer_memory;  ///< of files and frames on their way out
   Budget streams;
   ImportStore imports;  ///< they use all of the above
+  JobQueue jobs;
   std::atomic<bool> stopping{false};
   std::function<std::size_t()> connections;  ///< how many are served; set before the first request
   std::atomic<bool> is_ready;                ///< clouds, images and sessions are known

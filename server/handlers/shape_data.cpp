@@ -1,5 +1,8 @@
 #include "server/handlers/shape_data.h"
 
+#include <utility>
+#include <variant>
+
 namespace pointwright::server {
 
 using protocol::Problem;
@@ -42,6 +45,31 @@ Outcome<Done> find_data(const Service& service, const Caller& caller, const Sess
       return found;
   }
   return Done{};
+}
+
+std::optional<Problem> check_volumes(const std::vector<protocol::RecipeEdit>& edits, bool alone) {
+  for (std::size_t i = 0; i < edits.size(); ++i) {
+    for (const auto& [name, operations] :
+         {std::pair("/zero", &edits[i].zero), std::pair("/one", &edits[i].one)}) {
+      for (std::size_t k = 0; k < operations->size(); ++k) {
+        const PaintOperation& operation = (*operations)[k];
+        if (!has_shape(operation.mode)) continue;
+        const bool names_region = std::holds_alternative<RegionShape>(operation.shape);
+        const bool names_data = std::holds_alternative<ImageShape>(operation.shape) ||
+                                std::holds_alternative<ModelShape>(operation.shape);
+        if (!names_region && !(alone && names_data)) continue;
+        return Problem{
+            .kind = ProblemKind::kInvalidValue,
+            .detail = names_region ? "a recipe names no regions"
+                                   : "a job's recipe names no images and no other clouds",
+            .errors = {{.pointer = "/recipe/edits/" + std::to_string(i) + name + "/operations/" +
+                                   std::to_string(k) + "/shape/type",
+                        .detail = names_region ? "the regions of a session are not in a recipe"
+                                               : "must be a volume: export the session's recipe"}}};
+      }
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace pointwright::server

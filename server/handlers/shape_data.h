@@ -1,10 +1,12 @@
 #pragma once
 // What the shapes of painting operations name by an id: images and other clouds.
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/editing/painting.h"
+#include "protocol/json/recipe.h"
 #include "server/handlers/service.h"
 
 namespace pointwright::server {
@@ -16,5 +18,9 @@ Outcome<Done> find_data(const Service& service, const Caller& caller, const Sess
 /// The same for a list. `pointer`: to the list.
 Outcome<Done> find_data(const Service& service, const Caller& caller, const Session& session,
                         const std::string& pointer, std::vector<PaintOperation>& operations);
+
+/// A recipe holds volumes: it names no region of a session. `alone`: nor images and other clouds, for it is
+/// played where there are none.
+std::optional<protocol::Problem> check_volumes(const std::vector<protocol::RecipeEdit>& edits, bool alone);
 
 }  // namespace pointwright::server

@@ -22,17 +22,18 @@ namespace {
 constexpr int kFarDescriptor = 64;  // above every number that the child's own descriptors get
 constexpr std::chrono::milliseconds kLook{50};
 
-// What a child may need to start at all; nothing else of ours (tokens!) goes to it.
-std::vector<char*> child_environment() {
+// What a child may need to start at all; our settings (tokens!) never go to it.
+std::vector<char*> child_environment(bool inherits) {
   constexpr std::array<std::string_view, 6> kPassed{
       "LD_LIBRARY_PATH=", "ASAN_OPTIONS=",      "UBSAN_OPTIONS=",
       "TSAN_OPTIONS=",    "LLVM_PROFILE_FILE=", "LSAN_OPTIONS="};
   std::vector<char*> result;
   for (char** entry = environ; *entry != nullptr; ++entry) {
     const std::string_view text(*entry);
-    if (std::any_of(kPassed.begin(), kPassed.end(), [&](auto name) { return text.starts_with(name); })) {
-      result.push_back(*entry);
-    }
+    const bool is_passed = inherits ? !text.starts_with("POINTWRIGHT_")
+                                    : std::any_of(kPassed.begin(), kPassed.end(),
+                                                  [&](auto name) { return text.starts_with(name); });
+    if (is_passed) result.push_back(*entry);
   }
   result.push_back(nullptr);
   return result;
@@ -57,52 +58,63 @@ struct SpawnPlan {
   void require(int error) { good = good && error == 0; }
 };
 
-void reset_signals(SpawnPlan& plan) {
+void reset_signals(SpawnPlan& plan, bool leads_group) {
   sigset_t none;
   sigset_t all;
   sigemptyset(&none);
   sigfillset(&all);
   plan.require(posix_spawnattr_setsigmask(&plan.attributes, &none));
   plan.require(posix_spawnattr_setsigdefault(&plan.attributes, &all));
-  plan.require(posix_spawnattr_setflags(&plan.attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF));
+  const int group = leads_group ? POSIX_SPAWN_SETPGROUP : 0;
+  plan.require(posix_spawnattr_setpgroup(&plan.attributes, 0));
+  plan.require(posix_spawnattr_setflags(
+      &plan.attributes, static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | group)));
 }
 
-void set_descriptors(SpawnPlan& plan, const std::vector<Descriptor>& far) {
-  plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0));
-  plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0));
-  // A sanitizer's report is worth having.
-  if (!kSanitizedBuild) {
-    plan.require(posix_spawn_file_actions_addopen(&plan.actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0));
-  }
-  for (std::size_t i = 0; i < far.size(); ++i) {
-    plan.require(posix_spawn_file_actions_adddup2(&plan.actions, far[i].get(), static_cast<int>(3 + i)));
-  }
-  plan.require(posix_spawn_file_actions_addclosefrom_np(&plan.actions, static_cast<int>(3 + far.size())));
+void give(SpawnPlan& plan, const Descriptor& ours, int number, int flags) {
+  if (ours.is_open())
+    plan.require(posix_spawn_file_actions_adddup2(&plan.actions, ours.get(), number));
+  else
+    plan.require(posix_spawn_file_actions_addopen(&plan.actions, number, "/dev/null", flags, 0));
 }
 
 }  // namespace
 
-std::optional<pid_t> start_child(const std::string& program, const char* argument,
-                                 const std::vector<int>& descriptors) {
-  // Copies far up: dup2 onto 3, 4, … must not hit one that is still to be copied.
-  std::vector<Descriptor> far(descriptors.size());
-  for (std::size_t i = 0; i < far.size(); ++i) {
-    far[i] = Descriptor(fcntl(descriptors[i], F_DUPFD_CLOEXEC, kFarDescriptor));
-    if (!far[i].is_open()) return std::nullopt;
+std::optional<pid_t> start_child(const ChildPlan& wanted) {
+  // Copies far up: dup2 onto 1, 2, 3, … must not hit one that is still to be copied.
+  const auto far_copy = [](int descriptor) {
+    return Descriptor(fcntl(descriptor, F_DUPFD_CLOEXEC, kFarDescriptor));
+  };
+  std::vector<Descriptor> far;
+  for (const int descriptor : wanted.descriptors) {
+    far.push_back(far_copy(descriptor));
+    if (!far.back().is_open()) return std::nullopt;
   }
-  SpawnPlan plan;
-  reset_signals(plan);
-  set_descriptors(plan, far);
-  if (!plan.good) return std::nullopt;
-  std::string name = "pointwright-decoder";
-  std::string first(argument);
-  std::array<char*, 3> arguments{name.data(), first.data(), nullptr};
-  std::vector<char*> environment = child_environment();
-  pid_t child = 0;
-  if (posix_spawn(&child, program.c_str(), &plan.actions, &plan.attributes, arguments.data(),
-                  environment.data()) != 0) {
+  const Descriptor output = wanted.output < 0 ? Descriptor() : far_copy(wanted.output);
+  const Descriptor errors = wanted.errors < 0 ? Descriptor() : far_copy(wanted.errors);
+  if ((wanted.output >= 0 && !output.is_open()) || (wanted.errors >= 0 && !errors.is_open()))
     return std::nullopt;
-  }
+
+  SpawnPlan plan;
+  reset_signals(plan, wanted.leads_group);
+  give(plan, Descriptor(), STDIN_FILENO, O_RDONLY);
+  give(plan, output, STDOUT_FILENO, O_WRONLY);
+  // A sanitizer's report is worth having.
+  if (errors.is_open() || !kSanitizedBuild) give(plan, errors, STDERR_FILENO, O_WRONLY);
+  for (std::size_t i = 0; i < far.size(); ++i)
+    plan.require(posix_spawn_file_actions_adddup2(&plan.actions, far[i].get(), static_cast<int>(3 + i)));
+  plan.require(posix_spawn_file_actions_addclosefrom_np(&plan.actions, static_cast<int>(3 + far.size())));
+  if (!plan.good) return std::nullopt;
+  std::vector<std::string> texts = wanted.arguments;
+  std::vector<char*> arguments;
+  for (std::string& text : texts) arguments.push_back(text.data());
+  arguments.push_back(nullptr);
+  std::vector<char*> environment = child_environment(wanted.inherits_environment);
+  pid_t child = 0;
+  const auto start = wanted.program.find('/') == std::string::npos ? posix_spawnp : posix_spawn;
+  if (start(&child, wanted.program.c_str(), &plan.actions, &plan.attributes, arguments.data(),
+            environment.data()) != 0)
+    return std::nullopt;
   return child;
 }
 

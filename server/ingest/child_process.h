@@ -23,11 +23,21 @@ struct ChildEnd {
   int status = 0;            ///< its exit status
 };
 
-/// Starts `program argument` with standard input and output on /dev/null, the given descriptors as 3, 4, …,
-/// no other descriptor, default signals, and an environment of what the loader and sanitizers need. Safe in a
-/// process with threads.
-std::optional<pid_t> start_child(const std::string& program, const char* argument,
-                                 const std::vector<int>& descriptors);
+/// What a child is started with. Nothing else of ours goes to it: no other descriptor, default signals.
+struct ChildPlan {
+  std::string program;                      ///< looked up in $PATH where it names no folder
+  std::vector<std::string> arguments = {};  ///< the first one is its name
+  int output = -1;                          ///< its standard output; -1: /dev/null. Its input is always that
+  int errors = -1;                          ///< its standard error; the same
+  std::vector<int> descriptors = {};        ///< as 3, 4, …
+  /// It begins a process group, to be ended with all that it starts.
+  bool leads_group = false;
+  /// Our environment but for our own settings; else what the loader and sanitizers need.
+  bool inherits_environment = false;
+};
+
+/// Safe in a process with threads. Null where no process can be started.
+std::optional<pid_t> start_child(const ChildPlan& plan);
 
 /// Waits until the child is gone, whatever it takes: past the deadline (or once the context is cancelled) it
 /// is killed. `alive` reads end-of-file when the child is gone.

@@ -123,9 +123,10 @@ auto decode_in_child(const DecodeRequest& request, const Input& input, const Con
       (input.file < 0 && !write_all(content.get(), input.bytes))) {
     return decoder_error("there is no memory left to hand the file to a decoder");
   }
-  const auto child =
-      start_child(limits.program, kDecodeChildArgument,
-                  {record.get(), output.get(), held.get(), input.file < 0 ? content.get() : input.file});
+  const auto child = start_child(
+      {.program = limits.program,
+       .arguments = {"pointwright-decoder", kDecodeChildArgument},
+       .descriptors = {record.get(), output.get(), held.get(), input.file < 0 ? content.get() : input.file}});
   held.close();  // the child's copy alone keeps the pipe open
   if (!child) return decoder_error("no decoder could be started");
   const ChildEnd end =

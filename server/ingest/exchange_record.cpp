@@ -41,7 +41,8 @@ Error read_error(std::span<const std::byte> answer) {
   const std::size_t rest = answer.size() - sizeof(head);
   const bool sizes_fit = head.message_bytes <= kLongestText && head.field_bytes <= kLongestText &&
                          head.message_bytes + head.field_bytes == rest;
-  if (!sizes_fit || head.code > static_cast<std::uint32_t>(ErrorCode::kCancelled)) return unreadable();
+  if (!sizes_fit || head.message_bytes == 0 || head.code > static_cast<std::uint32_t>(ErrorCode::kCancelled))
+    return unreadable();
   const auto* text = reinterpret_cast<const char*>(answer.data()) + sizeof(head);
   Error error{.code = static_cast<ErrorCode>(head.code),
               .message = clean_text({text, head.message_bytes}),

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "server/cli/local_file.h"
 #include "server/ingest/files.h"
 #include "server/jobs/recipe_script.h"
+#include "server/jobs/scan_source.h"
 #include "server/jobs/tiled_job.h"
 
 namespace pointwright::server {
@@ -55,9 +55,7 @@ class MemoryJob {
     const auto format = format_of_name(params_.output);
     if (!format) return protocol::to_problem(format.error());
     progress_("reading", 0.0);
-    auto imported =
-        read_local_cloud(params_.input, {.max_samples = std::numeric_limits<std::uint32_t>::max() - 1U},
-                         std::numeric_limits<std::uint64_t>::max());
+    auto imported = read_scan(params_);
     if (!imported) return protocol::to_problem(imported.error());
     const std::optional<PositionGrid> grid = imported.value().report.grid;
     const auto cloud = std::make_shared<const Cloud>(std::move(imported.value().cloud));
@@ -154,19 +152,18 @@ class MemoryJob {
 
 }  // namespace
 
-Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionContext& context,
-                                       const JobProgress& progress) {
+Outcome<ChosenMode> choose_mode(const JobParams& params) {
   const bool splits = resamples(params.request);
   const bool same_file =
       std::filesystem::exists(params.output) && std::filesystem::equivalent(params.input, params.output);
   if (same_file)
     return Problem{.kind = ProblemKind::kInvalidValue, .detail = "a job does not write over its own input"};
   if (params.mode && *params.mode != JobMode::kTiles)
-    return MemoryJob(params, *params.mode, context, progress).run();
+    return ChosenMode{.mode = *params.mode, .file = {}, .records = {}};
   if (splits && params.mode)
     return Problem{.kind = ProblemKind::kInvalidValue,
                    .detail = "edits with resampling are not made in tiles: use the mode memory or direct"};
-  if (splits) return MemoryJob(params, JobMode::kMemory, context, progress).run();
+  if (splits) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
   auto file = MappedFile::open(params.input);
   if (!file) return protocol::to_problem(file.error());
   auto records = ScanRecords::of(file.value().bytes());
@@ -174,13 +171,23 @@ Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionC
   const auto wanted = format_of_name(params.output);
   if (!wanted) return protocol::to_problem(wanted.error());
   const bool fits = records.value().has_value() && records.value()->format == wanted.value();
-  if (fits) return run_tiles(params, file.value(), *records.value(), context, progress);
-  if (!params.mode) return MemoryJob(params, JobMode::kMemory, context, progress).run();
+  if (fits)
+    return ChosenMode{.mode = JobMode::kTiles, .file = std::move(file).value(), .records = *records.value()};
+  if (!params.mode) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
   return Problem{
       .kind = ProblemKind::kUnsupportedFormat,
       .detail =
           "in tiles are read binary PLY, whose vertices have no lists, and LAS, and written as what "
           "they were: use the mode memory"};
+}
+
+Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionContext& context,
+                                       const JobProgress& progress) {
+  auto chosen = choose_mode(params);
+  if (!chosen.ok()) return chosen.problem();
+  if (chosen.value().mode != JobMode::kTiles)
+    return MemoryJob(params, chosen.value().mode, context, progress).run();
+  return run_tiles(params, *chosen.value().file, *chosen.value().records, context, progress);
 }
 
 }  // namespace pointwright::server

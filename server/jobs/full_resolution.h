@@ -34,6 +34,11 @@ struct JobParams {
   std::uint64_t memory_bytes = std::uint64_t{1} << 30U;
   /// None: in tiles where the format and the recipe allow it.
   std::optional<JobMode> mode;
+  /// Scans that are not read as records are decoded in a confined process of at most `most_bytes`
+  /// (server/ingest/confined.h). The program must know kDecodeChildArgument.
+  bool confined = false;
+  std::uint64_t most_bytes = 0;  ///< of memory, for the report and the decoder; 0: all
+  bool drop_non_finite = false;  ///< in the modes memory and direct
 };
 
 /// What was done. Lengths are in model units.
@@ -51,6 +56,19 @@ struct JobReport {
   double max_difference = 0.0;
   double spacing = 0.0;  ///< the scan's typical one, to compare them with
 };
+
+/// What a job will take. Of the modes memory and direct it is an estimate.
+struct JobEstimate {
+  JobMode mode = JobMode::kTiles;
+  std::uint64_t samples = 0;
+  std::uint64_t memory_bytes = 0;
+  std::uint64_t disk_bytes = 0;       ///< of scratch files and the result together, at most
+  std::uint64_t free_disk_bytes = 0;  ///< where they go now
+  double seconds = 0.0;
+};
+/// Looks at the scan, plays the recipe where there is a preview, and times the edits on it. Writes nothing.
+/// Problems: those of run_full_resolution() that show so early
+Outcome<JobEstimate> estimate_full_resolution(const JobParams& params, const ExecutionContext& context);
 
 /// Where a job stands; called between phases and tiles.
 using JobProgress = std::function<void(const std::string& phase, double fraction)>;

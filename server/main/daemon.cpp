@@ -220,6 +220,7 @@ int run_daemon(const Config& config) {
     const bool drained = server.stop(std::chrono::milliseconds(config.limits.shutdown_deadline_ms));
     service.sessions.close_all("the server is stopping");
     service.imports.cancel_all();
+    service.jobs.stop();
     if (!drained) {
       log.write(LogLevel::kWarn, "stopped", {{"message", "some requests did not end in time"}});
     } else {

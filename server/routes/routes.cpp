@@ -38,6 +38,15 @@ constexpr std::array kRoutes = {
     Route{kGet, "/v1/imports", Body::kNone, list_imports},
     Route{kGet, "/v1/imports/{id}", Body::kNone, get_import},
     Route{kDelete, "/v1/imports/{id}", Body::kNone, delete_import},
+    Route{kGet, "/v1/jobs", Body::kNone, list_jobs},
+    Route{kPost, "/v1/jobs", Body::kLargeJson, create_job, kOwner, kOnce},
+    Route{kGet, "/v1/jobs/{id}", Body::kNone, get_job},
+    Route{kDelete, "/v1/jobs/{id}", Body::kNone, delete_job},
+    Route{kPost, "/v1/jobs/{id}/restart", Body::kNone, restart_job, kByMethod, kOnce},
+    Route{kGet, "/v1/jobs/{id}/log", Body::kNone, get_job_log},
+    Route{kGet, "/v1/jobs/{id}/events", Body::kNone, get_job_events},
+    Route{kGet, "/v1/jobs/{id}/results", Body::kNone, get_job_results},
+    Route{kGet, "/v1/jobs/{id}/results/{file}", Body::kNone, get_job_result},
     Route{kGet, "/v1/uploads", Body::kNone, list_uploads},
     Route{kPost, "/v1/uploads", Body::kUpload, create_upload, kOwner},
     Route{kGet, "/v1/uploads/{id}", Body::kNone, get_upload},
@@ -87,6 +96,11 @@ bool fits(std::string_view placeholder, std::string_view text) {
   if (placeholder == "{edit}")
     return !text.empty() && text.size() <= 9 &&
            text.find_first_not_of("0123456789") == std::string_view::npos;
+  if (placeholder == "{file}")
+    return !text.empty() && text.size() <= 64 && text.front() != '.' &&
+           std::all_of(text.begin(), text.end(), [](char c) {
+             return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '.';
+           });
   if (placeholder == "{slug}")
     return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
       return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
@@ -175,6 +189,10 @@ std::optional<Problem> check_sight(Service& service, const Route& route,
   } else if (is_below("/v1/imports/{id}")) {
     auto found = service.imports.owner_of(captures.front());
     if (!found || !caller.may_see(*found)) return missing("there is no such import");
+    owner = std::move(*found);
+  } else if (is_below("/v1/jobs/{id}")) {
+    auto found = service.jobs.owner_of(captures.front());
+    if (!found || !caller.may_see(*found)) return missing("there is no such job");
     owner = std::move(*found);
   } else if (is_below("/v1/images/{id}")) {
     const SharedImage image = service.images.find(captures.front());

@@ -56,7 +56,7 @@ std::string new_private_folder() {
 
 /// Whether nothing is there but what an interrupted first start or a file system itself leaves.
 bool is_fresh(const std::string& path) {
-  constexpr std::array<std::string_view, 4> kOurs = {kLockName, "blobs", "uploads", "quarantine"};
+  constexpr std::array<std::string_view, 5> kOurs = {kLockName, "blobs", "uploads", "jobs", "quarantine"};
   for (const auto& entry : std::filesystem::directory_iterator(path)) {
     const std::string name = entry.path().filename().string();
     const bool is_half_version = name.rfind(std::string(kVersionName) + ".new-", 0) == 0;
@@ -100,7 +100,7 @@ void DataFolder::take() {
   const std::string version = path_ + "/" + std::string(kVersionName);
   const bool is_new = !std::filesystem::exists(version);
   if (is_new && !is_fresh(path_)) refuse(path_, "holds other files: give it a folder of its own");
-  for (const std::string& folder : {blobs(), uploads(), quarantine()}) make_folder(folder);
+  for (const std::string& folder : {blobs(), uploads(), jobs(), quarantine()}) make_folder(folder);
   if (is_new) {
     const std::string text = std::to_string(kVersion) + "\n";
     const auto written = write_file_atomically(version, std::as_bytes(std::span(text.data(), text.size())));

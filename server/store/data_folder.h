@@ -32,6 +32,8 @@ class DataFolder {
   [[nodiscard]] std::string blobs() const { return path_ + "/blobs"; }
   /// What is still arriving.
   [[nodiscard]] std::string uploads() const { return path_ + "/uploads"; }
+  /// A folder for each job.
+  [[nodiscard]] std::string jobs() const { return path_ + "/jobs"; }
   /// What was found damaged, kept for whoever looks into it.
   [[nodiscard]] std::string quarantine() const { return path_ + "/quarantine"; }
   [[nodiscard]] std::string database() const { return path_ + "/pointwright.db"; }

@@ -85,7 +85,17 @@ CREATE TABLE region_operations (
 );
 )sql";
 
-constexpr std::array kSteps{kResources, kAnswers, kRegions};
+constexpr std::string_view kJobs = R"sql(
+CREATE TABLE jobs (
+  place INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, owner TEXT NOT NULL,
+  terms TEXT NOT NULL,      -- what was asked for
+  terms_seal TEXT NOT NULL,
+  state TEXT NOT NULL,      -- where it stands, and what it made
+  state_seal TEXT NOT NULL
+);
+)sql";
+
+constexpr std::array kSteps{kResources, kAnswers, kRegions, kJobs};
 
 }  // namespace
 

@@ -89,7 +89,7 @@ struct Guarded : TokenFile {
 
 /// What one owner has, to try every row on.
 struct Belongings {
-  std::string cloud, image, session, share, capability, upload, import;
+  std::string cloud, image, session, share, capability, upload, import, job;
   Belongings(Guarded& guarded, const std::string& token) {
     cloud = guarded.upload(token);
     const Reply made = guarded.ask(token, "POST", "/v1/images",
@@ -107,6 +107,10 @@ struct Belongings {
                                     "Content-Type: application/x-ply\r\nPrefer: respond-async\r\n");
     REQUIRE_MESSAGE(later.status == 202, later.body);
     import = later.json()["id"];
+    const Reply submitted =
+        guarded.ask(token, "POST", "/v1/jobs", R"({"session":")" + session + R"(","mode":"memory"})");
+    REQUIRE_MESSAGE(submitted.status == 202, submitted.body);
+    job = submitted.json()["jobID"];
     const Reply shared =
         guarded.ask(token, "POST", "/v1/sessions/" + session + "/shares", R"({"scope":"view"})");
     REQUIRE_MESSAGE(shared.status == 201, shared.body);
@@ -123,12 +127,14 @@ struct Belongings {
     put("/clouds/{id}", "/clouds/" + cloud);
     put("/images/{id}", "/images/" + image);
     put("/imports/{id}", "/imports/" + import);
+    put("/jobs/{id}", "/jobs/" + job);
     put("/sessions/{id}", "/sessions/" + session);
     put("/shares/{id}", "/shares/" + share);
     put("/tokens/{id}", "/tokens/" + session);  // no token has that id
     put("/uploads/{id}", "/uploads/" + upload);
     put("{edit}", "1");
     put("{region}", "zero");
+    put("{file}", "result.ply");
     put("{slug}", "not-found");
     REQUIRE(path.find('{') == std::string::npos);
     return path;
@@ -136,8 +142,8 @@ struct Belongings {
 };
 
 bool belongs_to_one(const Route& route) {
-  for (const char* prefix :
-       {"/v1/clouds/{id}", "/v1/images/{id}", "/v1/imports/{id}", "/v1/sessions/{id}", "/v1/uploads/{id}"})
+  for (const char* prefix : {"/v1/clouds/{id}", "/v1/images/{id}", "/v1/imports/{id}", "/v1/jobs/{id}",
+                             "/v1/sessions/{id}", "/v1/uploads/{id}"})
     if (route.pattern.rfind(prefix, 0) == 0) return true;
   return false;
 }

@@ -296,13 +296,30 @@ class AgainstTheDaemon(unittest.TestCase):
             self.client.upload(b"no cloud at all")
         with self.assertRaises(ValueError):
             self.session.paint("one", sphere((float("nan"), 0, 0), 1))
-        with self.assertRaises(NotSupported):
-            self.client.submit_job(session=self.session) if not self.client.has_feature("jobs") else self.fail_jobs()
         with self.assertRaises(Unreachable):
             Client("http://127.0.0.1:9", retries=0).info()
 
-    def fail_jobs(self):
-        raise NotSupported({})  # the server has jobs: nothing to refuse
+    def test_jobs_edit_scans_at_full_resolution(self):
+        self.session.paint("zero", box((-9, -9, -9), (0.2, 9, 9)))
+        self.session.paint("one", box((0.8, -9, -9), (9, 9, 9)))
+        self.session.edit(translation((0, 0, 0.2)))
+        estimate = self.client.validate_job(session=self.session)
+        self.assertEqual((estimate["mode"], estimate["sample_count"]), ("tiles", self.cloud.sample_count))
+        with self.assertRaises(TypeError):
+            self.client.validate_job(sessions=self.session)
+        job = self.client.submit_job(session=self.session, name="mine", priority=7).wait(timeout=60)
+        result = job.results()["results"][0]
+        target = self.path / "edited.ply"
+        self.assertEqual(job.download(target), result["bytes"])
+        self.assertEqual(target.stat().st_size, result["bytes"])
+        self.assertIn("successful", job.log()[0])
+        other = self.client.submit_job(recipe=self.session.recipe(), cloud=self.cloud, preview=self.cloud, format="xyz")
+        self.assertEqual(other.wait(timeout=60).document["report"]["mode"], "memory")
+        with self.assertRaises(ValueError):
+            other.download(target, "result.ply")
+        for each in (job, other):
+            each.delete()
+        self.assertEqual(self.client.jobs(), [])
 
     def test_uploads_tell_their_progress_and_their_limits(self):
         told = []

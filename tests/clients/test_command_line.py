@@ -164,17 +164,23 @@ class Jobs(CommandLine):
 
         fake = self.serve(handle)
         recipe = self.scan(b'{"format": "pointwright-recipe"}')
-        submitted = self.ask(fake, "job", "submit", "--recipe", str(recipe), "--cloud", "c", "--validate")
+        submitted = self.ask(fake, "job", "submit", "--recipe", str(recipe), "--cloud", "c", "--priority", "7")
         self.assertEqual((submitted.returncode, submitted.stdout), (0, b"j1\n"), submitted.stderr)
         self.assertEqual(json.loads(fake.requests[0].body),
-                         {"cloud": "c", "recipe": {"format": "pointwright-recipe"}, "validate": True})  # fmt: skip
+                         {"cloud": "c", "recipe": {"format": "pointwright-recipe"}, "priority": 7})  # fmt: skip
         self.assertEqual(self.ask(fake, "job", "wait", "j1", "--timeout", "0").returncode, 5)
         waited = self.ask(fake, "job", "wait", "j1")
         self.assertEqual(waited.returncode, 0, waited.stderr)
         self.assertIn(b"successful", waited.stdout)
         self.assertEqual(self.ask(fake, "job", "log", "j1", "--offset", "5").stdout, b"1 of 2\n")
         self.assertIn(b"j1", self.ask(fake, "job", "list").stdout)
+        states[:] = [("running", 40)]
         self.assertEqual(self.ask(fake, "job", "cancel", "j1").returncode, 0)
+        states[:] = [("successful", 100)]
+        ended = self.ask(fake, "job", "cancel", "j1")  # that would delete its results
+        self.assertEqual(ended.returncode, 2)
+        self.assertIn(b"has ended", ended.stderr)
+        self.assertEqual(self.ask(fake, "job", "delete", "j1").returncode, 0)
         states[:] = [("failed", 40)]
         self.assertEqual(self.ask(fake, "job", "wait", "j1").returncode, 2)
 

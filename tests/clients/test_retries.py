@@ -204,25 +204,25 @@ class Jobs(Served):
             method, path = request.command, request.path
             if (method, path) == ("POST", "/v1/jobs"):
                 self.submitted = json.loads(request.body)
-                return document({"id": "j1", "status": "accepted", "progress": 0}, 202, {"Location": "/v1/jobs/j1"})
+                return document({"jobID": "j1", "status": "accepted", "progress": 0}, 202, {"Location": "/v1/jobs/j1"})
             if path.startswith("/v1/jobs/j1/log"):
                 return 200, {}, b"tile 1 of 2\ntile 2 of 2\n"[int(path.split("offset=")[1]) :]
             if path == "/v1/jobs/j1/results":
-                return document({"output": {"cloud": "c"}})
+                return document({"results": [], "report": {"mode": "tiles"}})
             if path == "/v1/jobs/j1/restart":
-                return document({"id": "j1", "status": "accepted"}, 202)
+                return document({"jobID": "j1", "status": "accepted"}, 202)
             if method == "DELETE":
-                return document({"id": "j1", "status": "dismissed"})
+                return document({"jobID": "j1", "status": "dismissed"})
             status, progress = states[0] if len(states) == 1 else states.pop(0)
-            job = {"id": "j1", "status": status, "progress": progress, "message": "no room" if ending == "failed" else ""}
+            job = {"jobID": "j1", "status": status, "progress": progress, "message": "no room" if ending == "failed" else ""}
             return document({"jobs": [job]} if path == "/v1/jobs" else job)
 
         return self.serve(handle)[1]
 
     def test_a_job_is_followed_to_its_end(self):
         client = self.job_server("successful")
-        job = client.submit_job(cloud="c", recipe={"format": "pointwright-recipe"}, validate=True)
-        self.assertEqual(self.submitted, {"cloud": "c", "recipe": {"format": "pointwright-recipe"}, "validate": True})
+        job = client.submit_job(cloud="c", recipe={"format": "pointwright-recipe"}, preview=500)
+        self.assertEqual(self.submitted, {"cloud": "c", "recipe": {"format": "pointwright-recipe"}, "preview": {"count": 500}})
         told = []
         start = time.monotonic()
         self.assertEqual(job.wait(timeout=60, progress=told.append).status, "successful")
@@ -231,7 +231,9 @@ class Jobs(Served):
         text, offset = job.log()
         self.assertEqual(text.count("\n"), 2)
         self.assertEqual(job.log(offset), ("", offset))
-        self.assertEqual(job.results()["output"]["cloud"], "c")
+        self.assertEqual(job.results()["report"]["mode"], "tiles")
+        with self.assertRaises(ValueError):
+            job.download(os.devnull)
         self.assertEqual([entry.id for entry in client.jobs()], ["j1"])
         self.assertEqual(job.restart().status, "accepted")
         self.assertEqual(job.cancel().status, "dismissed")

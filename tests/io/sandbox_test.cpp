@@ -20,7 +20,9 @@ ChildEnd run(const char* misdeed, double deadline = 20.0, const ExecutionContext
   REQUIRE(pipe2(ends.data(), O_CLOEXEC) == 0);
   const Descriptor alive(ends[0]);
   Descriptor held(ends[1]);
-  const auto child = start_child(POINTWRIGHT_TEST_DECODER, misdeed, {input.get(), output.get(), held.get()});
+  const auto child = start_child({.program = POINTWRIGHT_TEST_DECODER,
+                                  .arguments = {"decoder", misdeed},
+                                  .descriptors = {input.get(), output.get(), held.get()}});
   REQUIRE(child.has_value());
   held.close();
   return wait_for_child(*child, alive, std::chrono::duration<double>(deadline), context);
@@ -60,7 +62,9 @@ TEST_CASE("a child that overstays is killed, and so is one whose work was cancel
 
 TEST_CASE("a program that is not there does not start") {
   const Descriptor null(open("/dev/null", O_RDWR | O_CLOEXEC));
-  CHECK_FALSE(start_child("/nonexistent/program", "--decode-child", {null.get(), null.get(), null.get()})
+  CHECK_FALSE(start_child({.program = "/nonexistent/program",
+                           .arguments = {"decoder", "--decode-child"},
+                           .descriptors = {null.get(), null.get(), null.get()}})
                   .has_value());
 }
 

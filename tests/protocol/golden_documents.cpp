@@ -2,6 +2,7 @@
 
 #include "protocol/json/access.h"
 #include "protocol/json/documents.h"
+#include "protocol/json/jobs.h"
 #include "protocol/json/recipe.h"
 #include "tests/protocol/golden.h"
 
@@ -63,6 +64,65 @@ ImportDocument import() {
           .created = created(),
           .state = ImportState::kRunning,
           .progress = {.phase = "ordering", .fraction = 0.6}};
+}
+
+JobDocument job() {
+  JobDocument document{.id = "j7k8l9m0n1o2p-q_r3s4t5", .terms = {.name = "The yard, bent"}};
+  document.terms.session = kSessionId;
+  document.terms.upload = upload().id;
+  document.terms.format = CloudFormat::kLas;
+  document.terms.priority = 7;
+  document.status = JobStatus::kRunning;
+  document.message = "is at work";
+  document.progress = {.phase = "tiles", .fraction = 0.625};
+  document.eta_s = 90.5;
+  document.attempts = 1;
+  document.created = created();
+  document.started = created() + std::chrono::seconds(1);
+  document.updated = created() + std::chrono::seconds(150);
+  return document;
+}
+
+JobDocument failed_job() {
+  JobDocument document = job();
+  document.status = JobStatus::kFailed;
+  document.message = "the worker was killed: most likely the machine had no memory left for it";
+  document.problem = Problem{.kind = ProblemKind::kInternalError, .detail = document.message};
+  document.eta_s = std::nullopt;
+  document.finished = document.updated;
+  return document;
+}
+
+JobDocument waiting_job() {
+  JobDocument document{.id = "k7k8l9m0n1o2p-q_r3s4t5", .terms = {.cloud = kCloudId}};
+  document.message = "waits for its turn";
+  document.progress = {.phase = "waiting", .fraction = 0.0};
+  document.queue_place = 1;
+  document.created = document.updated = created();
+  return document;
+}
+
+JobDocument done_job() {
+  JobDocument document = job();
+  document.status = JobStatus::kSuccessful;
+  document.report = {{"mode", "tiles"},
+                     {"sample_count", 257'413'000},
+                     {"moved", 31'000'000},
+                     {"inserted", 0},
+                     {"tiles", 412},
+                     {"tiles_kept", 0},
+                     {"preview",
+                      {{"sample_count", 100'000},
+                       {"matched", 99'871},
+                       {"rms_difference", 0.000125},
+                       {"max_difference", 0.00175}}},
+                     {"spacing", 0.00625},
+                     {"seconds", 437.5}};
+  document.results = {{.name = "result.las",
+                       .media_type = "application/vnd.las",
+                       .bytes = upload().length,
+                       .sha256 = cloud().sha256}};
+  return document;
 }
 
 ImageDocument image() {
@@ -274,6 +334,28 @@ std::vector<File> document_files() {
       {"import-list", import_list({import()})},
       {"import-cloud",
        JsonDocument{{"upload", upload().id}, {"name", "The yard"}, {"nonfinite", "drop"}, {"format", "las"}}},
+      {"job", to_json(job())},
+      {"job-failed", to_json(failed_job())},
+      {"job-list", job_list({waiting_job(), job()})},
+      {"job-results", job_results(done_job())},
+      {"job-event", job_event(job())},
+      {"job-request", JsonDocument{{"recipe", recipe()},
+                                   {"s", 0.5},
+                                   {"cloud", kCloudId},
+                                   {"preview", JsonDocument{{"count", 50'000}}},
+                                   {"output", JsonDocument{{"format", "ply"}}},
+                                   {"mode", "tiles"},
+                                   {"priority", 7},
+                                   {"name", "The yard, bent"}}},
+      {"job-of-session",
+       JsonDocument{
+           {"session", kSessionId}, {"upload", upload().id}, {"launcher", "local"}, {"validate", true}}},
+      {"job-estimate", JsonDocument{{"estimate", JsonDocument{{"mode", "tiles"},
+                                                              {"sample_count", 257'413'000},
+                                                              {"memory_bytes", 1'073'741'824},
+                                                              {"disk_bytes", 25'226'432'227},
+                                                              {"free_disk_bytes", 812'345'678'848},
+                                                              {"seconds", 440.5}}}}},
       {"image", to_json(image())},
       {"image-list", image_list({image()})},
       {"session-building", to_json(preview())},

@@ -32,7 +32,8 @@ TEST_CASE("every route is in the API's description, and everything described has
       continue;
     }
     std::string pattern = path;
-    for (const char* name : {"{cloud}", "{image}", "{import}", "{session}", "{share}", "{token}", "{upload}"})
+    for (const char* name :
+         {"{cloud}", "{image}", "{import}", "{job}", "{session}", "{share}", "{token}", "{upload}"})
       if (const std::size_t at = pattern.find(name); at != std::string::npos)
         pattern.replace(at, std::strlen(name), "{id}");
     for (const auto& [method, operation] : operations.items())

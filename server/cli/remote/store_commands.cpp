@@ -76,7 +76,10 @@ struct Wanted {
   std::string recipe;
   std::string session;
   std::string launcher;
-  std::string job_output;
+  std::string job_upload;
+  std::string preview_cloud;
+  std::string mode;
+  std::optional<std::uint64_t> priority;
   UploadOptions upload;
   std::optional<int> neighbors;
   std::optional<std::uint64_t> preview;
@@ -99,29 +102,89 @@ HttpAnswer ask_jobs(const Context& context, const std::string& method, const std
 }
 
 void tell_job(std::ostream& out, const json& job) {
-  const char* const id = job.contains("jobID") ? "jobID" : "id";
-  out << std::left << std::setw(kIdWidth) << job.value(id, "") << std::setw(12) << job.value("status", "")
-      << job.value("progress", json(0)) << " %  " << job.value("message", "") << "\n";
+  out << std::left << std::setw(kIdWidth) << job.value("jobID", "") << std::setw(12)
+      << job.value("status", "") << std::right << std::setw(3) << job.value("progress", json(0)) << " %  "
+      << job.value("message", "") << "\n";
 }
 
-void wait_for_job(const Context& context, const Wanted& wanted) {
+std::string job_path(const Wanted& wanted) {
+  return "/v1/jobs/" + url_encoded(wanted.id);
+}
+
+/// Waits for a job to end; answers its last answer. Throws CommandFailure where that is no success.
+HttpAnswer wait_for_job(const Context& context, const Wanted& wanted) {
   ProgressLine line(context.err, !context.json);
   HttpAnswer answer;
   json job;
   const auto is_over = [&] {
-    answer = ask_jobs(context, "GET", "/v1/jobs/" + wanted.id);
+    answer = ask_jobs(context, "GET", job_path(wanted));
     job = document_of(answer);
     const std::string status = job.value("status", "");
-    line.show(status, job.value("progress", 0.0) / 100.0);
+    std::string phase = job.value("phase", status);
+    if (job.contains("eta_s"))
+      phase += " (" + std::to_string(static_cast<int>(job.value("eta_s", 0.0)) + 1) + " s left)";
+    line.show(phase, job.value("progress", 0.0) / 100.0);
     return status == "successful" || status == "failed" || status == "dismissed";
   };
   if (!wait_until(is_over, wanted.timeout))
     throw CommandFailure{.code = ExitCode::kTimeout, .text = "the job is still at work"};
-  context.show(answer, [&](const json& document) { tell_job(context.out, document); });
   if (job.value("status", "") != "successful")
-    throw CommandFailure{
-        .code = ExitCode::kRefused,
-        .text = std::string("the job was not successful: ").append(job.value("message", ""))};
+    throw CommandFailure{.code = ExitCode::kRefused,
+                         .text = std::string("the job was not successful: ").append(job.value("message", "")),
+                         .document = answer.body};
+  return answer;
+}
+
+json job_body(const Wanted& wanted) {
+  json body = json::object();
+  if (!wanted.id.empty()) body["cloud"] = wanted.id;
+  if (!wanted.job_upload.empty()) body["upload"] = wanted.job_upload;
+  if (!wanted.recipe.empty()) {
+    json recipe = document_argument("--recipe", "@" + wanted.recipe);
+    // A request with a recipe, as sessions take it, is as good as the recipe itself.
+    if (recipe.is_object() && recipe.contains("recipe"))
+      body.update(recipe);
+    else
+      body["recipe"] = std::move(recipe);
+  }
+  if (!wanted.session.empty()) body["session"] = wanted.session;
+  if (!wanted.preview_cloud.empty()) body["preview"] = {{"cloud", wanted.preview_cloud}};
+  if (wanted.preview) body["preview"]["count"] = *wanted.preview;
+  if (!wanted.format.empty()) body["output"] = {{"format", wanted.format}};
+  if (!wanted.mode.empty()) body["mode"] = wanted.mode;
+  if (!wanted.launcher.empty()) body["launcher"] = wanted.launcher;
+  if (!wanted.name.empty()) body["name"] = wanted.name;
+  if (wanted.priority) body["priority"] = *wanted.priority;
+  if (wanted.validate) body["validate"] = true;
+  return body;
+}
+
+void submit_job(const Context& context, Wanted& wanted) {
+  if (wanted.recipe.empty() == wanted.session.empty())
+    throw CommandFailure{.code = ExitCode::kUsage, .text = "one of --recipe and --session"};
+  HttpAnswer answer = ask_jobs(context, "POST", "/v1/jobs", job_body(wanted));
+  if (wanted.validate) {
+    context.show(answer, [&](const json& document) {
+      for (const auto& [name, value] : document.at("estimate").items())
+        context.out << std::left << std::setw(18) << name << value << "\n";
+    });
+    return;
+  }
+  wanted.id = document_of(answer).at("jobID").get<std::string>();
+  if (wanted.wait) answer = wait_for_job(context, wanted);
+  context.show(answer, [&](const json&) { context.out << wanted.id << "\n"; });
+}
+
+/// The one file that a job has made, by its results.
+void download_result(const Context& context, const Wanted& wanted) {
+  const json results = document_of(ask_jobs(context, "GET", job_path(wanted) + "/results")).at("results");
+  for (const json& result : results) {
+    if (!wanted.name.empty() && result.at("name") != wanted.name) continue;
+    static_cast<void>(download(context.service, HttpRequest{.path = result.at("href").get<std::string>()},
+                               wanted.output, context.out));
+    return;
+  }
+  throw CommandFailure{.code = ExitCode::kRefused, .text = "the job has no such result"};
 }
 
 }  // namespace
@@ -224,45 +287,64 @@ void add_job_commands(CLI::App& app, RemoteCommands& commands) {
   const auto wanted = std::make_shared<Wanted>();
   CLI::App* const group =
       RemoteCommands::add_group(app, "job", "edits at full resolution, apart from sessions");
-  CLI::App* const submit =
-      commands.add(*group, "submit", "submit a job; prints its id", [wanted](const Context& context) {
-        if (wanted->recipe.empty() == wanted->session.empty())
-          throw CommandFailure{.code = ExitCode::kUsage, .text = "one of --recipe and --session"};
-        json body = json::object();
-        if (!wanted->id.empty()) body["cloud"] = wanted->id;
-        if (!wanted->recipe.empty()) body["recipe"] = document_argument("--recipe", "@" + wanted->recipe);
-        if (!wanted->session.empty()) body["session"] = wanted->session;
-        if (!wanted->job_output.empty()) body["output"] = document_argument("--output", wanted->job_output);
-        if (!wanted->launcher.empty()) body["launcher"] = wanted->launcher;
-        if (wanted->validate) body["validate"] = true;
-        const HttpAnswer answer = ask_jobs(context, "POST", "/v1/jobs", body);
-        context.show(
-            answer, [&](const json& job) { context.out << job.value("jobID", job.value("id", "")) << "\n"; });
-      });
+  CLI::App* const submit = commands.add(*group, "submit", "submit a job; prints its id",
+                                        [wanted](const Context& context) { submit_job(context, *wanted); });
   submit->add_option("--recipe", wanted->recipe, "a file with the edits; - for the standard input");
   submit->add_option("--session", wanted->session, "or the session that has them");
-  submit->add_option("--cloud", wanted->id, "the cloud to edit");
-  submit->add_option("--output", wanted->job_output, "what to make, as JSON or @FILE");
+  submit->add_option("--cloud", wanted->id, "the cloud to edit; the session's where not given");
+  submit->add_option("--upload", wanted->job_upload, "or a resumable upload that is complete, as it came");
+  submit->add_option("--preview-cloud", wanted->preview_cloud, "beside a recipe: the cloud that was edited");
+  submit->add_option("--preview-count", wanted->preview, "or how many samples of the scan stand in for it");
+  submit->add_option("--format", wanted->format,
+                     "of the result: ply, las, draco or xyz; else that of the scan");
+  submit->add_option("--mode", wanted->mode, "tiles, memory or direct; else tiles where that can be");
+  submit->add_option("--priority", wanted->priority, "0 to 9; higher ones go first");
+  submit->add_option("--name", wanted->name, "of the job and its result");
   submit->add_option("--launcher", wanted->launcher, "of the server's launchers");
-  submit->add_flag("--validate", wanted->validate, "check only");
+  submit->add_flag("--validate", wanted->validate, "only say what it would take");
+  submit->add_flag("--wait", wanted->wait, "until it has ended");
   commands.add(*group, "list", "all jobs", [](const Context& context) {
     context.show(ask_jobs(context, "GET", "/v1/jobs"), [&](const json& document) {
       for (const json& job : document.at("jobs")) tell_job(context.out, job);
     });
   });
-  CLI::App* const wait = commands.add(*group, "wait", "until a job has ended",
-                                      [wanted](const Context& context) { wait_for_job(context, *wanted); });
-  wait->add_option("--timeout", wanted->timeout, "seconds to wait; for ever where not given");
+  CLI::App* const info = commands.add(*group, "info", "one job", [wanted](const Context& context) {
+    context.show(ask_jobs(context, "GET", job_path(*wanted)),
+                 [&](const json& job) { tell_job(context.out, job); });
+  });
+  CLI::App* const wait =
+      commands.add(*group, "wait", "until a job has ended", [wanted](const Context& context) {
+        context.show(wait_for_job(context, *wanted), [&](const json& job) { tell_job(context.out, job); });
+      });
+  for (CLI::App* const command : {submit, wait})
+    command->add_option("--timeout", wanted->timeout, "seconds to wait; for ever where not given");
   CLI::App* const log = commands.add(*group, "log", "what a job says", [wanted](const Context& context) {
     const std::string offset = std::to_string(wanted->offset);
-    context.out
-        << ask_jobs(context, "GET", "/v1/jobs/" + url_encoded(wanted->id) + "/log?offset=" + offset).body;
+    context.out << ask_jobs(context, "GET", job_path(*wanted) + "/log?offset=" + offset).body;
   });
   log->add_option("--offset", wanted->offset, "byte to begin with");
+  CLI::App* const fetch =
+      commands.add(*group, "download", "write what a job has made into a file",
+                   [wanted](const Context& context) { download_result(context, *wanted); });
+  fetch->add_option("-o,--output", wanted->output, "the file; - for the standard output")->required();
+  fetch->add_option("--result", wanted->name, "which one; else the first");
+  CLI::App* const restart =
+      commands.add(*group, "restart", "start a job once more that failed or was dismissed",
+                   [wanted](const Context& context) {
+                     context.show(ask_jobs(context, "POST", job_path(*wanted) + "/restart"),
+                                  [&](const json& job) { tell_job(context.out, job); });
+                   });
   CLI::App* const cancel = commands.add(*group, "cancel", "dismiss a job", [wanted](const Context& context) {
-    (void)ask_jobs(context, "DELETE", "/v1/jobs/" + url_encoded(wanted->id));
+    // The same request deletes the results of a job that has ended.
+    const std::string status = document_of(ask_jobs(context, "GET", job_path(*wanted))).value("status", "");
+    if (status != "accepted" && status != "running")
+      throw CommandFailure{.code = ExitCode::kRefused, .text = "the job has ended already: it is " + status};
+    (void)ask_jobs(context, "DELETE", job_path(*wanted));
   });
-  for (CLI::App* const command : {wait, log, cancel})
+  CLI::App* const remove = commands.add(
+      *group, "delete", "forget a job that has ended, and its results",
+      [wanted](const Context& context) { (void)ask_jobs(context, "DELETE", job_path(*wanted)); });
+  for (CLI::App* const command : {info, wait, log, fetch, restart, cancel, remove})
     command->add_option("JOB", wanted->id, "its id")->required();
 }
 

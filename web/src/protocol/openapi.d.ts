@@ -801,6 +801,157 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/jobs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** All jobs */
+        get: operations["listJobs"];
+        put?: never;
+        /**
+         * Make edits on a scan at full resolution
+         * @description The recipe is played on a preview, and each sample of the scan is decomposed against the preview's own level surfaces: what was
+         *     edited on a hundred thousand samples is made on any number of them, with all of their detail. Binary PLY and LAS are edited in
+         *     tiles, in bounded memory and with every other property as it came; other formats, and edits with resampling, as a whole.
+         *     A job is a process of its own: it waits for its turn, goes on after a restart, and harms nothing else where it fails. Its
+         *     results stay for job_retention_s.
+         */
+        post: operations["createJob"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/jobs/{job}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        /** Where a job stands */
+        get: operations["getJob"];
+        put?: never;
+        post?: never;
+        /**
+         * Dismiss a job, or forget one that has ended
+         * @description A worker ends within a second; what it has done so far stays for a restart. A job that has ended is forgotten, with its log and
+         *     its results.
+         */
+        delete: operations["deleteJob"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/jobs/{job}/restart": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start a job once more that failed or was dismissed
+         * @description In tiles it goes on where it was.
+         */
+        post: operations["restartJob"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/jobs/{job}/log": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        /** What has happened to a job, line by line */
+        get: operations["getJobLog"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/jobs/{job}/events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        /**
+         * A job's changes as server-sent events, until it has ended
+         * @description The data of each event, `job`, is a `JobEvent`. Heartbeats are comments.
+         */
+        get: operations["jobEvents"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/jobs/{job}/results": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        /** What a job has made */
+        get: operations["getJobResults"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/jobs/{job}/results/{file}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+                file: string;
+            };
+            cookie?: never;
+        };
+        /** A file that a job has made */
+        get: operations["getJobResult"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -870,6 +1021,8 @@ export interface components {
             upload_bytes_per_day?: components["schemas"]["Count"];
             streams?: components["schemas"]["Count"];
             requests_per_second?: components["schemas"]["Count"];
+            /** @description That wait or run */
+            jobs?: components["schemas"]["Count"];
         };
         TokenRequest: {
             name: components["schemas"]["Name"];
@@ -1093,6 +1246,172 @@ export interface components {
         };
         ImportList: {
             imports: components["schemas"]["Import"][];
+        };
+        /** @enum {string} */
+        JobStatus: "accepted" | "running" | "successful" | "failed" | "dismissed";
+        JobOutput: {
+            /**
+             * @description That of the scan where it is absent, or PLY
+             * @enum {string}
+             */
+            format?: "ply" | "las" | "draco" | "xyz";
+        };
+        /** @description What the recipe is played on */
+        JobPreview: {
+            /** @description A cloud, such as the one that was edited */
+            cloud?: components["schemas"]["Id"];
+            /**
+             * @description Without a cloud, so many of the scan's own samples
+             * @default 100000
+             */
+            count: number;
+        };
+        /** @description The edits of a session or of a recipe; on a cloud, or on an upload as it came */
+        JobRequest: {
+            /** @description Its applied edits, played on its own samples; on its own cloud where none is named */
+            session?: components["schemas"]["Id"];
+            recipe?: components["schemas"]["Recipe"];
+            /** @default 1 */
+            s: number;
+            /**
+             * @default sequence
+             * @enum {string}
+             */
+            timing: "sequence" | "together";
+            cloud?: components["schemas"]["Id"];
+            /** @description A complete resumable upload, of any size; it stays */
+            upload?: components["schemas"]["Id"];
+            /** @description Beside a recipe */
+            preview?: components["schemas"]["JobPreview"];
+            /**
+             * @description Of a sample, beside a recipe
+             * @default 10
+             */
+            neighbors: number;
+            output?: components["schemas"]["JobOutput"];
+            /**
+             * @description tiles: bounded memory, PLY and LAS; memory: the whole scan at once; direct: on levels of the scan's own. Absent: tiles
+             *     where that can be, else memory
+             * @enum {string}
+             */
+            mode?: "tiles" | "memory" | "direct";
+            /**
+             * @description One of the server's launchers
+             * @default local
+             */
+            launcher: string;
+            /**
+             * @description Higher ones go first
+             * @default 5
+             */
+            priority: number;
+            /** @description Of the job and its results */
+            name?: components["schemas"]["Name"];
+            /**
+             * @description Only say what it would take
+             * @default false
+             */
+            validate: boolean;
+        };
+        JobEstimate: {
+            estimate: {
+                /** @enum {string} */
+                mode: "tiles" | "memory" | "direct";
+                sample_count: components["schemas"]["Count"];
+                memory_bytes: components["schemas"]["Count"];
+                /** @description Of scratch and result together, at most */
+                disk_bytes: components["schemas"]["Count"];
+                free_disk_bytes: components["schemas"]["Count"];
+                seconds: number;
+            };
+        };
+        Link: {
+            rel: string;
+            type: string;
+            href: string;
+        };
+        /** @description What was asked for, the recipe left out */
+        JobTerms: {
+            name?: string;
+            session?: components["schemas"]["Id"];
+            cloud?: components["schemas"]["Id"];
+            upload?: components["schemas"]["Id"];
+            preview?: components["schemas"]["JobPreview"];
+            neighbors: components["schemas"]["Count"];
+            s: number;
+            /** @enum {string} */
+            timing: "sequence" | "together";
+            output?: components["schemas"]["JobOutput"];
+            /** @enum {string} */
+            mode?: "tiles" | "memory" | "direct";
+            launcher: string;
+            priority: components["schemas"]["Count"];
+        };
+        /** @description What a worker did; lengths in model units */
+        JobReport: {
+            /** @enum {string} */
+            mode: "tiles" | "memory" | "direct";
+            sample_count: components["schemas"]["Count"];
+            moved: components["schemas"]["Count"];
+            inserted: components["schemas"]["Count"];
+            tiles: components["schemas"]["Count"];
+            /** @description Done before, by a worker that was interrupted */
+            tiles_kept: components["schemas"]["Count"];
+            /** @description Between what the preview shows and what was made of the same samples */
+            preview: {
+                sample_count: components["schemas"]["Count"];
+                matched: components["schemas"]["Count"];
+                rms_difference: number;
+                max_difference: number;
+            };
+            spacing: number;
+            seconds: number;
+        };
+        /** @description statusInfo of OGC API - Processes, with more */
+        Job: {
+            jobID: components["schemas"]["Id"];
+            /** @constant */
+            type: "process";
+            /** @constant */
+            processID: "edit";
+            status: components["schemas"]["JobStatus"];
+            message: string;
+            progress: number;
+            phase: string;
+            created: components["schemas"]["Time"];
+            updated: components["schemas"]["Time"];
+            started?: components["schemas"]["Time"];
+            finished?: components["schemas"]["Time"];
+            /** @description Seconds that it may still take, once that can be said */
+            eta_s?: number;
+            /** @description 1: the next one */
+            queue_place?: components["schemas"]["Count"];
+            /** @description How often a worker was started */
+            attempts: components["schemas"]["Count"];
+            request: components["schemas"]["JobTerms"];
+            report?: components["schemas"]["JobReport"];
+            /** @description Why it failed */
+            exception?: components["schemas"]["Problem"];
+            links: components["schemas"]["Link"][];
+        };
+        JobList: {
+            jobs: components["schemas"]["Job"][];
+            links: components["schemas"]["Link"][];
+        };
+        JobResults: {
+            results: {
+                name: string;
+                type: string;
+                bytes: components["schemas"]["Count"];
+                sha256: string;
+                href: string;
+            }[];
+            report: components["schemas"]["JobReport"];
+        };
+        JobEvent: {
+            /** @constant */
+            event: "job";
+            job: components["schemas"]["Job"];
         };
         /** @enum {string} */
         SessionState: "building" | "ready" | "failed" | "asleep";
@@ -1600,6 +1919,16 @@ export interface components {
         };
     };
     responses: {
+        /** @description The job */
+        Job: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/json": components["schemas"]["Job"];
+            };
+        };
         /** @description Refused; the document says why */
         Problem: {
             headers: {
@@ -1665,6 +1994,7 @@ export interface components {
         };
     };
     parameters: {
+        JobId: components["schemas"]["Id"];
         CloudId: components["schemas"]["Id"];
         ImageId: components["schemas"]["Id"];
         TokenId: components["schemas"]["Id"];
@@ -3420,6 +3750,260 @@ export interface operations {
             404: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
             503: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    listJobs: {
+        parameters: {
+            query?: {
+                status?: components["schemas"]["JobStatus"];
+                /** @description At most so many */
+                limit?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Jobs, newest first */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobList"];
+                };
+            };
+            422: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    createJob: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["JobRequest"];
+            };
+        };
+        responses: {
+            /** @description With validate, what the job would take */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobEstimate"];
+                };
+            };
+            /** @description The job waits for its turn */
+            202: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    Location: components["headers"]["Location"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            400: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            413: components["responses"]["Problem"];
+            415: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            429: components["responses"]["Busy"];
+            503: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    getJob: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: components["responses"]["Job"];
+            404: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    deleteJob: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: components["responses"]["Job"];
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    restartJob: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
+            };
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The job waits for its turn */
+            202: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    Location: components["headers"]["Location"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            429: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    getJobLog: {
+        parameters: {
+            query?: {
+                /** @description The byte to begin with; at most a mebibyte is sent at once */
+                offset?: number;
+            };
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Text from the offset on; empty where there is no more yet */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": string;
+                };
+            };
+            404: components["responses"]["Problem"];
+            422: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    jobEvents: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Events until the job has ended */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/event-stream": string;
+                };
+            };
+            404: components["responses"]["Problem"];
+            429: components["responses"]["Busy"];
+            503: components["responses"]["Busy"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    getJobResults: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                job: components["parameters"]["JobId"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The files, and the worker's report */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobResults"];
+                };
+            };
+            404: components["responses"]["Problem"];
+            409: components["responses"]["Problem"];
+            default: components["responses"]["Problem"];
+        };
+    };
+    getJobResult: {
+        parameters: {
+            query?: never;
+            header?: {
+                "If-None-Match"?: components["parameters"]["IfNoneMatch"];
+            };
+            path: {
+                job: components["parameters"]["JobId"];
+                file: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The file */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    ETag: components["headers"]["ETag"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/x-ply": string;
+                    "model/x-draco": string;
+                    "application/vnd.las": string;
+                    "text/plain": string;
+                };
+            };
+            304: components["responses"]["NotModified"];
+            404: components["responses"]["Problem"];
             default: components["responses"]["Problem"];
         };
     };

@@ -52,6 +52,7 @@ const schemaOfExample: Record<string, string> = {
   "event-heartbeat": "HeartbeatEvent",
   "event-presence": "PresenceEvent",
   "event-end": "EndEvent",
+  "job-event": "JobEvent",
 };
 for (const media of mediaTypes()) {
   for (const name of Object.keys(media.examples ?? {})) {

@@ -1,0 +1,76 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "server/jobs/full_resolution.h"
+#include "server/jobs/recipe_script.h"
+#include "server/jobs/scan_source.h"
+
+namespace pointwright::server {
+namespace {
+
+/// Scratch of tiles: one record of a sample, and one more where it moves (tile_store.h).
+constexpr std::uint64_t kSpoolBytes = 64;
+/// Of the modes memory and direct, beside the cloud's own columns: neighbours, levels, bases, results.
+constexpr std::uint64_t kWorkingBytes = 400;
+/// Without a preview nothing can be timed: what two cores of 2023 do with two edits in two bands.
+constexpr double kUsualSecondsPerSample = 2e-6;
+/// Reading, cutting and writing come on top of the edits.
+constexpr double kSecondsPerByte = 4e-9;
+
+/// What the recipe takes on each sample, timed on the preview itself.
+Outcome<double> seconds_per_sample(const JobParams& params, const ExecutionContext& context) {
+  if (params.preview == nullptr) return kUsualSecondsPerSample;
+  const auto levels = hierarchy_for(params.request.recipe, *params.preview, params.neighbors);
+  if (!levels.ok()) return levels.problem();
+  const auto played = play_on_preview(params.request, params.preview, levels.value(), context);
+  if (!played.ok()) return played.problem();
+  const auto begin = std::chrono::steady_clock::now();
+  const AnchorIndex anchors(played.value().script.rest);
+  const auto made = transfer_edits(played.value().script, anchors, params.preview, context);
+  if (!made) return protocol::to_problem(made.error());
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  return took.count() / static_cast<double>(params.preview->size());
+}
+
+/// Where the folder will be: the nearest one above it that is there.
+std::filesystem::path place_of(const std::string& path) {
+  std::error_code none;
+  std::filesystem::path place = std::filesystem::absolute(path, none);
+  while (place.has_relative_path() && !std::filesystem::exists(place, none)) place = place.parent_path();
+  return place;
+}
+
+}  // namespace
+
+Outcome<JobEstimate> estimate_full_resolution(const JobParams& params, const ExecutionContext& context) {
+  const auto chosen = choose_mode(params);
+  if (!chosen.ok()) return chosen.problem();
+  JobEstimate estimate{.mode = chosen.value().mode};
+  std::error_code none;
+  const std::uint64_t bytes = std::filesystem::file_size(params.input, none);
+  if (chosen.value().records) {
+    estimate.samples = chosen.value().records->count;
+    estimate.memory_bytes = params.memory_bytes;
+    estimate.disk_bytes = estimate.samples * kSpoolBytes + bytes;
+  } else {
+    const auto scan = read_scan(params);
+    if (!scan) return protocol::to_problem(scan.error());
+    estimate.samples = scan.value().cloud.size();
+    estimate.memory_bytes = memory_of(scan.value().cloud) + estimate.samples * kWorkingBytes;
+    estimate.disk_bytes = memory_of(scan.value().cloud);
+  }
+  const auto each = seconds_per_sample(params, context);
+  if (!each.ok()) return each.problem();
+  estimate.seconds =
+      each.value() * static_cast<double>(estimate.samples) + kSecondsPerByte * static_cast<double>(bytes);
+  const auto space = std::filesystem::space(place_of(params.folder), none);
+  if (!none) estimate.free_disk_bytes = space.available;
+  return estimate;
+}
+
+}  // namespace pointwright::server
