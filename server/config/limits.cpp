@@ -91,7 +91,9 @@ constexpr std::array kTable = {
               "resumable uploads of one token held at once"},
     LimitInfo{"token_upload_file_bytes", &Limits::token_upload_file_bytes, 0, kTebi,
               "bytes of one token's resumable uploads together, as they are announced"},
+    LimitInfo{"token_shares", &Limits::token_shares, 0, 10'000, "share links of one token"},
     LimitInfo{"max_tokens", &Limits::max_tokens, 1, 10'000, "tokens, those that have expired included"},
+    LimitInfo{"max_shares", &Limits::max_shares, 0, 10'000, "share links of all sessions together"},
 };
 
 }  // namespace
