@@ -76,8 +76,9 @@ Problem over_rate(std::string detail, double limit, double seconds) {
 
 }  // namespace
 
-Access::Access(const Limits& limits, std::string token_file)
+Access::Access(const Limits& limits, std::string token_file, ShareKeeper* keeper)
     : tokens(std::move(token_file)),
+      shares(limits.token_shares, limits.max_shares, keeper),
       limits_(limits),
       requests_(kMaxCallers),
       uploads_(kMaxCallers),

@@ -7,6 +7,7 @@
 
 #include "server/access/accounts.h"
 #include "server/access/buckets.h"
+#include "server/access/share.h"
 #include "server/access/share_store.h"
 #include "server/access/token_store.h"
 #include "server/base/caller.h"
@@ -20,7 +21,8 @@ namespace pointwright::server {
 class Access {
  public:
   /// `token_file`: empty where no tokens are in use. Throws std::runtime_error where it cannot be used.
-  Access(const Limits& limits, std::string token_file);
+  /// `keeper`: keeps share links; null: nobody does. It must outlive this.
+  Access(const Limits& limits, std::string token_file, ShareKeeper* keeper = nullptr);
 
   TokenStore tokens;
   ShareStore shares;

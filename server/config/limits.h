@@ -59,7 +59,9 @@ struct Limits {
   std::uint64_t token_requests_per_second = 200;
   std::uint64_t token_uploads = 16;
   std::uint64_t token_upload_file_bytes = 32ULL << 30U;
+  std::uint64_t token_shares = 256;
   std::uint64_t max_tokens = 1000;
+  std::uint64_t max_shares = 2048;
   std::uint64_t max_jobs = 200;
   std::uint64_t max_running_jobs = 1;
   std::uint64_t job_tile_bytes = 1ULL << 30U;

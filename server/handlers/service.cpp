@@ -33,6 +33,7 @@ Service::Service(Config settings, ServiceParts parts)
       folder(config.data),
       database(folder.lasts() ? folder.database() : std::string()),
       archive(folder.lasts() ? std::make_unique<Archive>(folder, database) : nullptr),
+      kept_shares(folder.lasts() ? std::make_unique<ShareArchive>(database) : nullptr),
       answers(database, config.limits.max_kept_answers),
       decode(std::move(parts.decode)),
       decode_image(std::move(parts.decode_image)),
@@ -42,7 +43,7 @@ Service::Service(Config settings, ServiceParts parts)
       interactive(pool_threads(config), static_cast<int>(config.threads), parts.report_failure),
       background(std::max<std::size_t>(pool_threads(config) / 2, 2), static_cast<int>(config.threads),
                  parts.report_failure),
-      access(config.limits, token_file(config)),
+      access(config.limits, token_file(config), kept_shares.get()),
       clouds(config.limits, archive.get(), cloud_loader(decode_file, decode, background, config.limits)),
       images(config.limits, archive.get()),
       uploads(config.limits, folder.uploads()),
@@ -53,7 +54,7 @@ Service::Service(Config settings, ServiceParts parts)
            .build = std::move(parts.build),
            .resample = std::move(parts.resample),
            .note_time = [this](const std::string& step, double ms) { metrics.add_time(step, ms / 1e3); }},
-          archive.get()),
+          archive.get(), [this](const std::string& session) { access.shares.forget(session); }),
       upload_memory(config.limits.max_upload_memory),
       json_memory(config.limits.max_json_memory),
       answer_memory(config.limits.max_answer_memory),
@@ -92,6 +93,10 @@ std::vector<std::string> Service::recover() {
     for (const KeptSession& session : kept)
       if (session.damage) notes.push_back("session " + session.id + " is not served: " + *session.damage);
     sessions.restore(std::move(kept));
+    std::size_t damaged_shares = 0;
+    access.shares.restore(kept_shares->shares(damaged_shares));
+    if (damaged_shares > 0)
+      notes.push_back(std::to_string(damaged_shares) + " share links are damaged and open nothing");
     if (damaged == 0) archive->sweep();
     for (std::string& note :
          jobs.recover([this](const std::string& owner) { return access.hold_again(owner, Quota::kJobs, 1); }))

@@ -27,6 +27,7 @@
 #include "server/store/import_store.h"
 #include "server/store/importer.h"
 #include "server/store/session_store.h"
+#include "server/store/share_archive.h"
 #include "server/store/upload_store.h"
 
 namespace pointwright::server {
@@ -54,6 +55,7 @@ class Service {
   Database database;        ///< in memory where the folder does not last
   /// What outlives the process; null where nothing does.
   const std::unique_ptr<Archive> archive;
+  const std::unique_ptr<ShareArchive> kept_shares;  ///< the same of share links
   Answers answers;
   const Decoder decode;
   const ImageDecoder decode_image;

@@ -68,7 +68,6 @@ Response delete_session(Service& service, const Request& request) {
   if (!expected.ok()) return problem_response(expected.problem(), request);
   if (auto removed = service.sessions.remove(request.captures.at(0), expected.value()); !removed.ok())
     return problem_response(removed.problem(), request);
-  service.access.shares.forget(request.captures.at(0));
   return {.status = 204};
 }
 

@@ -17,6 +17,11 @@ Response create_share(Service& service, const Request& request) {
   const std::string& id = session.value()->id();
   const auto made = service.access.shares.add(id, request.caller.token, terms.value());
   if (!made.ok()) return problem_response(made.problem(), request);
+  if (!service.sessions.owner_of(id)) {
+    // Deleted in between, where nothing is kept that would have told.
+    service.access.shares.forget(id);
+    return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such session"}, request);
+  }
   const auto& [share, capability] = made.value();
   protocol::JsonDocument document = protocol::to_json(share.document);
   document["capability"] = capability;

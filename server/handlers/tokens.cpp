@@ -20,6 +20,7 @@ Response create_token(Service& service, const Request& request) {
 Response revoke_token(Service& service, const Request& request) {
   if (auto revoked = service.access.tokens.revoke(request.captures.at(0)); !revoked.ok())
     return problem_response(revoked.problem(), request);
+  service.access.shares.forget_owner(request.captures.at(0));
   return {.status = 204};
 }
 

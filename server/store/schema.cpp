@@ -85,6 +85,20 @@ CREATE TABLE region_operations (
 );
 )sql";
 
+constexpr std::string_view kShares = R"sql(
+CREATE TABLE shares (
+  place INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE,
+  session TEXT NOT NULL REFERENCES sessions (id) ON DELETE CASCADE,
+  owner TEXT NOT NULL,      -- the token of who shared; empty: none were in use
+  scope TEXT NOT NULL,
+  created INTEGER NOT NULL,
+  expires INTEGER NOT NULL, -- -1: never
+  sha256 TEXT NOT NULL,     -- of the capability, which is nowhere
+  seal TEXT NOT NULL
+);
+CREATE INDEX shares_of_session ON shares (session);
+)sql";
+
 constexpr std::string_view kJobs = R"sql(
 CREATE TABLE jobs (
   place INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, owner TEXT NOT NULL,
@@ -95,7 +109,7 @@ CREATE TABLE jobs (
 );
 )sql";
 
-constexpr std::array kSteps{kResources, kAnswers, kRegions, kJobs};
+constexpr std::array kSteps{kResources, kAnswers, kRegions, kShares, kJobs};
 
 }  // namespace
 

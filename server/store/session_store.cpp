@@ -67,11 +67,12 @@ Problem no_such_session() {
 }  // namespace
 
 SessionStore::SessionStore(const Limits& limits, const CloudStore& clouds, SessionServices services,
-                           Archive* archive)
+                           Archive* archive, Removed removed)
     : limits_(limits),
       clouds_(clouds),
       services_(std::move(services)),
       archive_(archive),
+      removed_(std::move(removed)),
       memory_(limits.max_session_bytes) {
   if (limits_.session_idle_expiry_s > 0)
     watcher_ = std::jthread([this](const std::stop_token& stop) { watch_expiry(stop); });
@@ -433,11 +434,14 @@ Outcome<Done> SessionStore::remove(const std::string& id, Session::Expected expe
     if (session != nullptr) session->close(reason);
   }
   Entry removed;
-  const std::lock_guard lock(mutex_);
-  const auto entry = entry_of(id);
-  if (entry == entries_.end()) return no_such_session();
-  removed = std::move(*entry);
-  entries_.erase(entry);
+  {
+    const std::lock_guard lock(mutex_);
+    const auto entry = entry_of(id);
+    if (entry == entries_.end()) return no_such_session();
+    removed = std::move(*entry);
+    entries_.erase(entry);
+  }
+  if (removed_) removed_(id);
   return Done{};
 }
 

@@ -23,9 +23,11 @@ namespace pointwright::server {
 /// Thread-safe.
 class SessionStore {
  public:
+  using Removed = std::function<void(const std::string& id)>;
   /// `archive`: where sessions are kept; null: nowhere, and none ever sleeps. Both must outlive the store.
+  /// `removed` hears of each session that is gone, whether it was deleted or nobody asked for it.
   SessionStore(const Limits& limits, const CloudStore& clouds, SessionServices services,
-               Archive* archive = nullptr);
+               Archive* archive = nullptr, Removed removed = {});
   ~SessionStore();
   SessionStore(const SessionStore&) = delete;
   SessionStore& operator=(const SessionStore&) = delete;
@@ -102,6 +104,7 @@ class SessionStore {
   const CloudStore& clouds_;
   const SessionServices services_;
   Archive* const archive_;
+  const Removed removed_;
   Budget memory_;
   mutable std::mutex mutex_;  // guards what follows
   std::vector<Entry> entries_;

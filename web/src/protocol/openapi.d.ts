@@ -503,7 +503,9 @@ export interface paths {
          * A link that opens this session to whoever has it
          * @description The capability is told this once. It belongs into the fragment of the viewer's address, which browsers never send
          *     (`/?session=<id>#k=<capability>` or `/#s=<id>&k=<capability>`), and into `Authorization: Bearer`. It gives no more
-         *     than the token that it came from has at the time, and ends with it.
+         *     than the token that it came from has at the time, and ends with it, and with the session. Where the server keeps sessions
+         *     (`--data`) the link lasts over restarts. A token may have `token_shares` links, and all together `max_shares` (429). A lost
+         *     answer is lost: list the links, revoke the one that nobody holds, and ask for another.
          */
         post: operations["createShare"];
         delete?: never;
@@ -3093,6 +3095,7 @@ export interface operations {
             415: components["responses"]["Problem"];
             422: components["responses"]["Problem"];
             429: components["responses"]["Busy"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
@@ -3110,6 +3113,7 @@ export interface operations {
         responses: {
             204: components["responses"]["Done"];
             404: components["responses"]["Problem"];
+            507: components["responses"]["Busy"];
             default: components["responses"]["Problem"];
         };
     };
