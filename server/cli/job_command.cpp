@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <limits>
@@ -66,6 +67,16 @@ class ProgressLine {
   std::string phase_;
 };
 
+/// This process's memory at its highest; 0 where the system does not say.
+std::uint64_t peak_memory_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    std::uint64_t kibibytes = 0;
+    if (word == "VmHWM:" && status >> kibibytes) return kibibytes << 10U;
+  }
+  return 0;
+}
+
 protocol::JsonDocument to_json(const JobReport& report, double seconds) {
   return {{"mode", kModeNames[static_cast<std::size_t>(report.mode)]},
           {"sample_count", report.samples},
@@ -79,7 +90,8 @@ protocol::JsonDocument to_json(const JobReport& report, double seconds) {
             {"rms_difference", report.rms_difference},
             {"max_difference", report.max_difference}}},
           {"spacing", report.spacing},
-          {"seconds", seconds}};
+          {"seconds", seconds},
+          {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 }  // namespace
@@ -171,7 +183,8 @@ int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) 
   if (report.tiles_kept > 0) out << " (" << report.tiles_kept << " were done already)";
   out << "\npreview     " << report.preview_samples << " samples; " << report.matched
       << " of them differ from the result by " << report.rms_difference << " rms, " << report.max_difference
-      << " at most\nspacing     " << report.spacing << "\ntime        " << seconds << " s\n";
+      << " at most\nspacing     " << report.spacing << "\ntime        " << seconds << " s, "
+      << (peak_memory_bytes() >> 20U) << " MiB at most\n";
   return 0;
 }
 
