@@ -90,6 +90,7 @@ protocol::JsonDocument to_json(const JobReport& report, double seconds) {
             {"rms_difference", report.rms_difference},
             {"max_difference", report.max_difference}}},
           {"spacing", report.spacing},
+          {"files", report.files},
           {"seconds", seconds},
           {"peak_memory_bytes", peak_memory_bytes()}};
 }
@@ -117,6 +118,11 @@ CLI::App* add_job_run(CLI::App& group, JobRunOptions& options) {
                       "how far the edits are played, 0 to 1; 1 where the file does not say");
   command->add_option("--timing", options.timing, "the edits one after the other, or all at once")
       ->check(CLI::IsMember({"sequence", "together"}));
+  command
+      ->add_option("--steps", options.steps,
+                   "an animation: so many clouds from s = 0 up to s, beside the result's name as "
+                   "name_0001.ply, name_0002.ply and so on")
+      ->check(CLI::Range(2U, kMaxJobSteps));
   command->add_option("--neighbors", options.neighbors, "of a sample's neighbourhood, 4 to 32")
       ->check(CLI::Range(4U, 32U))
       ->capture_default_str();
@@ -161,6 +167,7 @@ int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) 
     if (!preview) return refuse(err, options.preview + ": " + preview.error().message, 1);
     params.preview = std::make_shared<const Cloud>(std::move(preview.value().cloud));
   }
+  params.steps = options.steps;
   ProgressLine line(err, options.quiet || options.json);
   const auto begin = std::chrono::steady_clock::now();
   Outcome<JobReport> outcome = JobReport{};
@@ -185,6 +192,9 @@ int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) 
       << " of them differ from the result by " << report.rms_difference << " rms, " << report.max_difference
       << " at most\nspacing     " << report.spacing << "\ntime        " << seconds << " s, "
       << (peak_memory_bytes() >> 20U) << " MiB at most\n";
+  if (report.files.size() > 1)
+    out << "files       " << report.files.size() << ", " << report.files.front() << " to "
+        << report.files.back() << "\n";
   return 0;
 }
 

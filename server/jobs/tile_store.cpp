@@ -320,23 +320,23 @@ Result<TileInput> TileStore::load(std::size_t tile, std::uint32_t rings, std::ui
   return input;
 }
 
-std::string TileStore::result_path(std::size_t tile) const {
-  return folder_ + "/tile-" + std::to_string(tile) + ".result";
+std::string TileStore::result_path(std::size_t tile, std::size_t step) const {
+  return folder_ + "/tile-" + std::to_string(tile) + "-" + std::to_string(step) + ".result";
 }
 
-bool TileStore::has_result(std::size_t tile) const {
+bool TileStore::has_result(std::size_t tile, std::size_t step) const {
   struct stat status {};
-  return ::stat(result_path(tile).c_str(), &status) == 0;
+  return ::stat(result_path(tile, step).c_str(), &status) == 0;
 }
 
-Result<void> TileStore::put_result(std::size_t tile, const TileResult& result) const {
+Result<void> TileStore::put_result(std::size_t tile, std::size_t step, const TileResult& result) const {
   std::vector<std::byte> bytes;
   bytes.reserve(24 + result.moved.size() * sizeof(TileSample) + result.matches.size() * sizeof(PreviewMatch));
   const std::array<std::uint64_t, 3> head{kResultMagic, result.moved.size(), result.matches.size()};
   append(bytes, head.data(), head.size());
   append(bytes, result.moved.data(), result.moved.size());
   append(bytes, result.matches.data(), result.matches.size());
-  return write_file_atomically(result_path(tile), bytes);
+  return write_file_atomically(result_path(tile, step), bytes);
 }
 
 Result<TileResultView> view_result(std::span<const std::byte> bytes) {

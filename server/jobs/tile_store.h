@@ -68,10 +68,11 @@ class TileStore {
   [[nodiscard]] Result<TileInput> load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
                                        float least_ring, bool has_normals) const;
 
-  [[nodiscard]] bool has_result(std::size_t tile) const;
+  /// Of one step of an animation; a plain job has step 0 alone.
+  [[nodiscard]] bool has_result(std::size_t tile, std::size_t step) const;
   /// On the disk once it returns. Errors: those of write_file_atomically
-  Result<void> put_result(std::size_t tile, const TileResult& result) const;
-  [[nodiscard]] std::string result_path(std::size_t tile) const;
+  Result<void> put_result(std::size_t tile, std::size_t step, const TileResult& result) const;
+  [[nodiscard]] std::string result_path(std::size_t tile, std::size_t step) const;
 
  private:
   struct Extent {

@@ -50,18 +50,27 @@ constexpr std::uint64_t kWriteChunk = std::uint64_t{1} << 20U;  // samples
 constexpr std::size_t kChunksAtOnce = 2;
 
 /// Neighbourhoods around a sample that its own outcome depends on.
-std::uint32_t rings_of(const EditScript& script) {
-  const auto bands = static_cast<std::uint32_t>(script.bases.bands.size());
-  std::uint32_t rings = 1;
-  for (const TransferredEdit& edit : script.edits) rings += bands - edit.params.level + 1;
-  return rings;
+std::uint32_t rings_of(const PlayedSteps& played) {
+  const auto bands = static_cast<std::uint32_t>(played.script.bases.bands.size());
+  std::uint32_t most = 1;
+  for (const PlayedSteps::Step& step : played.steps) {
+    std::uint32_t rings = 1;
+    for (const TransferredEdit& edit : step.edits) rings += bands - edit.params.level + 1;
+    most = std::max(most, rings);
+  }
+  return most;
 }
 
 class TiledJob {
  public:
   TiledJob(const JobParams& params, const MappedFile& file, const ScanRecords& records,
            const ExecutionContext& context, const JobProgress& progress)
-      : params_(params), file_(file), records_(records), context_(context), progress_(progress) {}
+      : params_(params),
+        file_(file),
+        records_(records),
+        context_(context),
+        progress_(progress),
+        outputs_(outputs_of(params)) {}
 
   Outcome<JobReport> run() {
     report_.samples = records_.count;
@@ -111,9 +120,9 @@ class TiledJob {
     std::uint64_t kept = 0;
     for (const auto& entry : std::filesystem::directory_iterator(params_.folder))
       if (entry.is_regular_file()) kept += entry.file_size();
-    const std::uint64_t all = 2 * sizeof(TileSample) * records_.count;
+    const std::uint64_t all = (1 + outputs_.size()) * sizeof(TileSample) * records_.count;
     const std::uint64_t scratch = all - std::min(all, kept);
-    const std::uint64_t output = file_.bytes().size();
+    const std::uint64_t output = outputs_.size() * file_.bytes().size();
     const std::string beside = std::filesystem::path(params_.output).parent_path().string();
     const Place here = place_of(params_.folder);
     const Place there = place_of(beside.empty() ? "." : beside);
@@ -138,14 +147,15 @@ class TiledJob {
     report_.preview_samples = preview_->size();
     const auto levels = hierarchy_for(params_.request.recipe, *preview_, params_.neighbors);
     if (!levels.ok()) return levels.problem();
-    auto played = play_on_preview(params_.request, preview_, levels.value(), context_);
+    auto played = play_steps_on_preview(params_.request, static_cast<std::uint32_t>(outputs_.size()),
+                                        preview_, levels.value(), context_);
     if (!played.ok()) return played.problem();
     played_ = std::move(played.value());
     EditScript& script = played_.script;
     script.spacing_ratio = static_cast<float>(std::min(
         1.0, std::sqrt(static_cast<double>(preview_->size()) / static_cast<double>(records_.count))));
     report_.spacing = static_cast<double>(script.bases.spacing * script.spacing_ratio);
-    rings_ = rings_of(script);
+    rings_ = rings_of(played_);
     return std::nullopt;
   }
 
@@ -159,18 +169,21 @@ class TiledJob {
       for (const float* column : {points.x(), points.y(), points.z()})
         add(column, points.size() * sizeof(float));
     };
-    const std::array<std::uint64_t, 4> numbers{records_.count, most, params_.neighbors, rings_};
+    const std::array<std::uint64_t, 5> numbers{records_.count, most, params_.neighbors, rings_,
+                                               outputs_.size()};
     add(numbers.data(), sizeof numbers);
     add(&surveyed_.min, sizeof(Vec3d));
     add(&surveyed_.max, sizeof(Vec3d));
     for (const Vec3d& p : surveyed_.position) add(&p, sizeof p);
     for (const Vec3f& n : surveyed_.normal) add(&n, sizeof n);
     add_points(played_.rest);
-    add_points(played_.result);
-    for (const TransferredEdit& edit : played_.script.edits) {
-      const std::array<std::uint64_t, 3> head{edit.params.level, edit.regions.zero.size(),
-                                              edit.regions.one.size()};
-      add(head.data(), sizeof head);
+    for (const PlayedSteps::Step& step : played_.steps) {
+      add_points(step.result);
+      for (const TransferredEdit& edit : step.edits) {
+        const std::array<std::uint64_t, 3> head{edit.params.level, edit.regions->zero.size(),
+                                                edit.regions->one.size()};
+        add(head.data(), sizeof head);
+      }
     }
     return to_hex(hash.finish());
   }
@@ -231,7 +244,8 @@ class TiledJob {
       progress_("tile " + std::to_string(tile + 1) + " of " + std::to_string(store_->tile_count()),
                 0.2 + 0.7 * static_cast<double>(done) / static_cast<double>(records_.count));
       done += store_->sample_count(tile);
-      if (store_->has_result(tile)) {
+      // Steps come in their order.
+      if (store_->has_result(tile, outputs_.size() - 1)) {
         ++report_.tiles_kept;
         return false;
       }
@@ -254,14 +268,21 @@ class TiledJob {
     if (context_.is_cancelled()) return protocol::to_problem(cancelled_error());
     auto input = store_->load(tile, rings_, params_.neighbors, least_ring, records_.has_normals());
     if (!input) return protocol::to_problem(input.error());
-    auto made = transfer_edits(played_.script, anchors, input.value().cloud, context_);
-    if (!made) return protocol::to_problem(made.error());
-    if (auto put = store_->put_result(tile, result_of(input.value(), made.value())); !put)
-      return protocol::to_problem(put.error());
+    auto rest = decompose_samples(played_.script, anchors, input.value().cloud, context_);
+    if (!rest) return protocol::to_problem(rest.error());
+    for (std::size_t step = 0; step < outputs_.size(); ++step) {
+      const bool is_last = step + 1 == outputs_.size();
+      auto made = make_edits(played_.script, played_.steps[step].edits,
+                             is_last ? std::move(rest).value() : rest.value(), context_);
+      if (!made) return protocol::to_problem(made.error());
+      const TileResult result = result_of(input.value(), made.value(), played_.steps[step].result);
+      if (auto put = store_->put_result(tile, step, result); !put) return protocol::to_problem(put.error());
+    }
     return std::nullopt;
   }
 
-  [[nodiscard]] TileResult result_of(const TileInput& input, const TransferredSamples& made) const {
+  [[nodiscard]] TileResult result_of(const TileInput& input, const TransferredSamples& made,
+                                     const Points& shown) const {
     struct Fate {
       TileSample sample;
       float rest_distance = 0.0F;
@@ -277,7 +298,7 @@ class TiledJob {
         const Vec3f p = now.position[i];
         const Vec3f n = now.normal[i];
         const std::uint32_t anchor = made.anchor[i];
-        const Vec3f apart = (p - before[i]) - (played_.result[anchor] - played_.rest[anchor]);
+        const Vec3f apart = (p - before[i]) - (shown[anchor] - played_.rest[anchor]);
         fates[i] = {.sample = {.index = input.index[i],
                                .position = {p.x(), p.y(), p.z()},
                                .normal = {n.x(), n.y(), n.z()}},
@@ -319,12 +340,20 @@ class TiledJob {
   };
 
   std::optional<Problem> write() {
-    progress_("result", 0.9);
+    for (std::size_t step = 0; step < outputs_.size(); ++step)
+      if (auto problem = write(step)) return problem;
+    report_.files = outputs_;
+    return std::nullopt;
+  }
+
+  std::optional<Problem> write(std::size_t step) {
+    progress_result(step, 0.0);
+    report_.moved = 0;
     std::vector<MovedSamples> moved;
     std::vector<PreviewMatch> best(played_.rest.size(), {.rest_distance = std::numeric_limits<float>::max()});
     for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
-      if (!store_->has_result(tile)) continue;
-      auto file = MappedFile::open(store_->result_path(tile));
+      if (!store_->has_result(tile, step)) continue;
+      auto file = MappedFile::open(store_->result_path(tile, step));
       if (!file) return protocol::to_problem(file.error());
       auto view = view_result(file.value().bytes());
       if (!view) return protocol::to_problem(view.error());
@@ -334,20 +363,25 @@ class TiledJob {
           best[match.anchor] = match;
       moved.push_back({.file = std::move(file).value(), .samples = view.value().moved});
     }
-    DifferenceSum differences;
+    DifferenceSum differences;  // the last step's stay
     for (const PreviewMatch& match : best)
       if (static_cast<double>(match.rest_distance) <= report_.spacing)
         differences.add(static_cast<double>(match.difference));
     differences.report(report_);
 
     const auto written =
-        fill_file_atomically(params_.output, [&](int out) { return write_records(out, moved); });
+        fill_file_atomically(outputs_[step], [&](int out) { return write_records(step, out, moved); });
     if (!written) return protocol::to_problem(written.error());
     return std::nullopt;
   }
 
+  void progress_result(std::size_t step, double part) const {
+    progress_("result",
+              0.9 + 0.1 * (static_cast<double>(step) + part) / static_cast<double>(outputs_.size()));
+  }
+
   /// False: errno says why.
-  Result<bool> write_records(int out, const std::vector<MovedSamples>& moved) {
+  Result<bool> write_records(std::size_t step, int out, const std::vector<MovedSamples>& moved) {
     const std::span<const std::byte> bytes = file_.bytes();
     if (!write_all_at(out, bytes.first(static_cast<std::size_t>(records_.begin)), 0)) return false;
     // Every chunk has its place in the file, so they may be made and written side by side.
@@ -379,7 +413,7 @@ class TiledJob {
         if (!write_all_at(out, chunk, from)) failure = errno;
         file_.release(from, to);
         const std::lock_guard lock(mutex);
-        progress_("result", 0.9 + 0.1 * static_cast<double>(++done) / static_cast<double>(chunks + 1));
+        progress_result(step, static_cast<double>(++done) / static_cast<double>(chunks + 1));
       }
     };
     parallel_for(
@@ -435,7 +469,8 @@ class TiledJob {
   ScanSurvey surveyed_;
   Cloud candidates_;
   std::shared_ptr<const Cloud> preview_;
-  PlayedRecipe played_;
+  const std::vector<std::string> outputs_;  // one for each step
+  PlayedSteps played_;
   std::uint32_t rings_ = 1;
   std::optional<TileStore> store_;
 };
