@@ -947,6 +947,7 @@ class Client:
         upload: Optional[str] = None,
         preview: Union[int, str, "Cloud", None] = None,
         format: Optional[str] = None,  # noqa: A002
+        steps: Optional[int] = None,
         mode: Optional[str] = None,
         s: Optional[float] = None,
         timing: Optional[str] = None,
@@ -959,15 +960,16 @@ class Client:
 
         preview: beside a recipe, the cloud that was edited, or how many of the scan's samples stand in for it
         format: of the result: ply, las, draco or xyz; that of the scan where it is not given
+        steps: of an animation, so many clouds from s = 0 on
         mode: tiles (bounded memory), memory or direct; tiles where that can be, where it is not given
         """
-        body = _job_body(recipe, session, cloud, upload, preview, format, mode, s, timing, name, priority, launcher)
+        body = _job_body(recipe, session, cloud, upload, preview, format, steps, mode, s, timing, name, priority, launcher)
         response = self._job_request("POST", "/v1/jobs", json=body)
         return Job(self, response.json(), response.headers.get("Location"))
 
     def validate_job(self, **terms: Any) -> Document:
         """What a job would take, with the arguments of submit_job(): mode, samples, memory, disk, seconds."""
-        arguments = ("recipe", "session", "cloud", "upload", "preview", "format", "mode", "s", "timing", "name",
+        arguments = ("recipe", "session", "cloud", "upload", "preview", "format", "steps", "mode", "s", "timing", "name",
                      "priority", "launcher")  # fmt: skip
         unknown = set(terms) - set(arguments)
         if unknown:
@@ -992,6 +994,7 @@ def _job_body(
     upload: Optional[str],
     preview: Union[int, str, "Cloud", None],
     format: Optional[str],  # noqa: A002
+    steps: Optional[int],
     mode: Optional[str],
     s: Optional[float],
     timing: Optional[str],
@@ -1011,7 +1014,7 @@ def _job_body(
         seen = {"count": preview} if isinstance(preview, int) else {"cloud": identity(preview)}
     return _given(
         recipe=recipe, session=identity(session), cloud=identity(cloud), upload=upload, preview=seen,
-        output=None if format is None else {"format": format}, mode=mode, s=s, timing=timing, name=name,
+        output=_given(format=format, steps=steps) or None, mode=mode, s=s, timing=timing, name=name,
         priority=priority, launcher=launcher,
     )  # fmt: skip
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <nanoflann.hpp>
 
+#include "engine/core/check.h"
+
 namespace pointwright {
 namespace {
 
@@ -65,6 +67,32 @@ class NearestSet {
   float bound_ = std::numeric_limits<float>::infinity();
 };
 
+// The same for a single one, which some point is known to be no farther than.
+class NearestOne {
+ public:
+  using DistanceType = float;
+
+  explicit NearestOne(const Neighbor& start) : nearest_(start), bound_(search_bound(start.distance_sq)) {}
+
+  [[nodiscard]] std::uint32_t index() const { return nearest_.index; }
+  [[nodiscard]] std::size_t size() const { return 1; }
+  [[nodiscard]] bool full() const { return true; }
+  // NOLINTNEXTLINE(readability-identifier-naming)
+  bool addPoint(float distance_sq, std::uint32_t i) {
+    const Neighbor candidate{i, distance_sq};
+    if (!(candidate < nearest_)) return true;
+    nearest_ = candidate;
+    bound_ = search_bound(distance_sq);
+    return true;
+  }
+  // NOLINTNEXTLINE(readability-identifier-naming)
+  [[nodiscard]] float worstDist() const { return bound_; }
+
+ private:
+  Neighbor nearest_;
+  float bound_;
+};
+
 }  // namespace
 
 struct KdTree::Tree {
@@ -104,6 +132,13 @@ void KdTree::nearest(const Vec3f& query, std::size_t k, std::vector<Neighbor>& f
   if (found.empty()) return;
   NearestSet nearest(found, tree_->subset);
   tree_->index->findNeighbors(nearest, query.data(), nanoflann::SearchParams());
+}
+
+std::uint32_t KdTree::nearest_from(const Vec3f& query, std::uint32_t start) const {
+  POINTWRIGHT_CHECK(start < size() && tree_->subset.empty(), "a point of a tree of all points");
+  NearestOne nearest({start, tree_->index->distance.evalMetric(query.data(), start, 3)});
+  tree_->index->findNeighbors(nearest, query.data(), nanoflann::SearchParams());
+  return nearest.index();
 }
 
 bool KdTree::within(const Vec3f& query, float radius, std::size_t limit, std::vector<Neighbor>& found) const {

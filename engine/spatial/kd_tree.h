@@ -38,6 +38,10 @@ class KdTree {
   /// answer.
   void nearest(const Vec3f& query, std::size_t k, std::vector<Neighbor>& found) const;
 
+  /// The nearest one alone; the sooner, the nearer the point number `start` is to it.
+  /// Pre: a tree of all points, not of a subset
+  [[nodiscard]] std::uint32_t nearest_from(const Vec3f& query, std::uint32_t start) const;
+
   /// All points within `radius` (a distance, not its square), by distance, then index, but at most `limit` of
   /// them, the nearest; returns whether that limit cut the answer.
   bool within(const Vec3f& query, float radius, std::size_t limit, std::vector<Neighbor>& found) const;

@@ -22,9 +22,12 @@ std::vector<std::uint32_t> AnchorIndex::anchors_of(const Points& position, const
       [&](std::size_t begin, std::size_t end) {
         std::vector<Neighbor> found;
         for (std::size_t i = begin; i < end; ++i) {
-          tree_.nearest(position[i], normal.empty() ? 1 : kFirstLook, found);
+          if (normal.empty()) {  // in coherent order the last one's is near
+            anchors[i] = tree_.nearest_from(position[i], i > begin ? anchors[i - 1] : 0);
+            continue;
+          }
+          tree_.nearest(position[i], kFirstLook, found);
           anchors[i] = found.front().index;
-          if (normal.empty()) continue;
           const auto same_side = [&, side = normal[i]] {
             for (const Neighbor& neighbor : found) {
               if (preview_.normal[neighbor.index].dot(side) <= 0.0F) continue;

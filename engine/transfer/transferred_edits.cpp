@@ -72,17 +72,19 @@ Anchors carried_anchors(const Sampling& before, const Anchors& anchors, const Sa
   return carried;
 }
 
-Result<void> check_script(const EditScript& script, const MultiresSurface& surface) {
-  for (std::size_t i = 0; i < script.edits.size(); ++i) {
-    const TransferredEdit& edit = script.edits[i];
+Result<void> check_edits(const EditScript& script, std::span<const TransferredEdit> edits,
+                         const MultiresSurface& surface) {
+  for (std::size_t i = 0; i < edits.size(); ++i) {
+    const TransferredEdit& edit = edits[i];
     if (auto valid = validate(edit.params, surface); !valid) {
       Error error = valid.error();
       error.message = "edit " + std::to_string(i + 1) + ": " + error.message;
       return error;
     }
-    POINTWRIGHT_CHECK(edit.derived.bands.size() <= surface.band_count(), "a base for each derived level");
-    POINTWRIGHT_CHECK(!edit.regions.zero.empty() && !edit.regions.one.empty(), "regions have volume");
-    for (const BaseSurface& base : edit.derived.bands)
+    POINTWRIGHT_CHECK(!edit.regions->zero.empty() && !edit.regions->one.empty(), "regions have volume");
+    if (edit.derived == nullptr) continue;
+    POINTWRIGHT_CHECK(edit.derived->bands.size() <= surface.band_count(), "a base for each derived level");
+    for (const BaseSurface& base : edit.derived->bands)
       POINTWRIGHT_CHECK(base.counterpart.size() >= (base.position.empty() ? 0 : script.rest.position.size()),
                         "bases of the preview's samples");
   }
@@ -91,9 +93,9 @@ Result<void> check_script(const EditScript& script, const MultiresSurface& surfa
 
 }  // namespace
 
-Result<TransferredSamples> transfer_edits(const EditScript& script, const AnchorIndex& index,
-                                          std::shared_ptr<const Cloud> cloud, const ExecutionContext& context,
-                                          MultiresSurface* rest) {
+Result<TransferredSamples> decompose_samples(const EditScript& script, const AnchorIndex& index,
+                                             std::shared_ptr<const Cloud> cloud,
+                                             const ExecutionContext& context) {
   if (cloud->size() == 0)
     return Error{.code = ErrorCode::kEmptyCloud, .message = "the cloud has no samples", .field = "cloud"};
   POINTWRIGHT_CHECK(cloud->origin == script.origin, "positions relative to the script's origin");
@@ -102,48 +104,60 @@ Result<TransferredSamples> transfer_edits(const EditScript& script, const Anchor
   if (context.is_cancelled()) return cancelled_error();
 
   TransferredSamples result;
-  MultiresSurface surface;
+  MultiresSurface& surface = result.surface;
   surface.levels.resize(script.bases.bands.size() + 1);
   surface.detail.resize(script.bases.bands.size());
   Level& finest = surface.levels.back();
   finest.position = cloud->position;
   finest.normal = usable_normals(*cloud, *graph, context);
   if (context.is_cancelled()) return cancelled_error();
-  Anchors anchors =
-      index.anchors_of(cloud->position, cloud->has_normals() ? finest.normal : Points(), context);
+  result.anchor = index.anchors_of(cloud->position, cloud->has_normals() ? finest.normal : Points(), context);
   if (context.is_cancelled()) return cancelled_error();
-  if (!cloud->has_normals()) take_sides(script.rest, anchors, finest.normal);
-  if (auto valid = check_script(script, surface); !valid) return valid.error();
-  if (auto made = decompose_onto(script.bases, script.spacing_ratio, anchors, surface, context); !made)
+  if (!cloud->has_normals()) take_sides(script.rest, result.anchor, finest.normal);
+  if (auto made = decompose_onto(script.bases, script.spacing_ratio, result.anchor, surface, context); !made)
     return made.error();
-  if (rest != nullptr) *rest = surface;
-
   std::vector<float> spacing = local_spacing(cloud->position, *graph);
   result.sampling =
       std::make_shared<const Sampling>(rest_sampling(std::move(cloud), std::move(graph), std::move(spacing)));
-  for (const TransferredEdit& edit : script.edits) {
-    if (auto made = decompose_onto(edit.derived, script.spacing_ratio, anchors, surface, context); !made)
-      return made.error();
-    const ScaleField field = compute_scale_field(surface.levels[edit.params.level].position, edit.regions,
+  return result;
+}
+
+Result<TransferredSamples> make_edits(const EditScript& script, std::span<const TransferredEdit> edits,
+                                      TransferredSamples samples, const ExecutionContext& context) {
+  MultiresSurface& surface = samples.surface;
+  if (auto valid = check_edits(script, edits, surface); !valid) return valid.error();
+  for (const TransferredEdit& edit : edits) {
+    if (edit.derived != nullptr) {
+      auto made = decompose_onto(*edit.derived, script.spacing_ratio, samples.anchor, surface, context);
+      if (!made) return made.error();
+    }
+    const ScaleField field = compute_scale_field(surface.levels[edit.params.level].position, *edit.regions,
                                                  edit.params.blend, &context);
     if (context.is_cancelled()) return cancelled_error();
     if (edit.params.resampling) {
-      auto made = apply_resampled_edit(surface, result.sampling, edit.params, field, edit.regions,
+      auto made = apply_resampled_edit(surface, samples.sampling, edit.params, field, *edit.regions,
                                        ResamplingEffort::kExact, &context);
       if (!made) return made.error();
-      anchors = carried_anchors(*result.sampling, anchors, *made.value().sampling);
+      samples.anchor = carried_anchors(*samples.sampling, samples.anchor, *made.value().sampling);
       surface = std::move(made.value().surface);
-      result.sampling = std::move(made.value().sampling);
+      samples.sampling = std::move(made.value().sampling);
     } else {
       MultiresSurface edited =
-          apply_edit(surface, *result.sampling->graph, edit.params, field, script.origin);
-      result.sampling = carried_sampling(result.sampling, surface, edit.params, field);
+          apply_edit(surface, *samples.sampling->graph, edit.params, field, script.origin);
+      samples.sampling = carried_sampling(samples.sampling, surface, edit.params, field);
       surface = std::move(edited);
     }
   }
-  result.surface = std::move(surface);
-  result.anchor = std::move(anchors);
-  return result;
+  return samples;
+}
+
+Result<TransferredSamples> transfer_edits(const EditScript& script, const AnchorIndex& anchors,
+                                          std::shared_ptr<const Cloud> cloud, const ExecutionContext& context,
+                                          MultiresSurface* rest) {
+  auto samples = decompose_samples(script, anchors, std::move(cloud), context);
+  if (!samples) return samples.error();
+  if (rest != nullptr) *rest = samples.value().surface;
+  return make_edits(script, script.edits, std::move(samples).value(), context);
 }
 
 }  // namespace pointwright

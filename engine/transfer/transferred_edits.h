@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "engine/core/cloud.h"
@@ -29,10 +30,10 @@ struct LevelBases {
 struct TransferredEdit {
   EditParams params;
   /// The regions that it was made with, as volumes around the edited level's samples.
-  RegionPair regions;
+  std::shared_ptr<const RegionPair> regions;
   /// Where levels were derived anew before this edit, because earlier ones had left them behind: the base
-  /// surfaces of the preview's coarser levels, made of its level derived.bands.size(). Else without bands.
-  LevelBases derived;
+  /// surfaces of the preview's coarser levels, made of its level derived->bands.size(). Else null.
+  std::shared_ptr<const LevelBases> derived;
 };
 
 /// All that a preview's history says about samples which it does not hold. Immutable while it is used.
@@ -71,5 +72,13 @@ struct TransferredSamples {
 Result<TransferredSamples> transfer_edits(const EditScript& script, const AnchorIndex& anchors,
                                           std::shared_ptr<const Cloud> cloud, const ExecutionContext& context,
                                           MultiresSurface* rest = nullptr);
+
+/// The two halves of it: samples before the first edit, which any number of scripts with the same bases can go
+/// on from; and the edits on them, which may be other ones than script.edits.
+Result<TransferredSamples> decompose_samples(const EditScript& script, const AnchorIndex& anchors,
+                                             std::shared_ptr<const Cloud> cloud,
+                                             const ExecutionContext& context);
+Result<TransferredSamples> make_edits(const EditScript& script, std::span<const TransferredEdit> edits,
+                                      TransferredSamples samples, const ExecutionContext& context);
 
 }  // namespace pointwright

@@ -42,6 +42,9 @@ void read_output(ObjectReader& object, JobTerms& terms) {
   if (const Json* const format = members.optional("format"))
     if (const auto choice = read_choice(*format, members.pointer_to("format"), object.errors(), names))
       terms.format = kJobFormats.at(*choice);
+  if (const Json* const steps = members.optional("steps"))
+    terms.steps =
+        read_integer(*steps, members.pointer_to("steps"), object.errors(), 2, kMostSteps).value_or(0);
   members.finish();
 }
 
@@ -166,7 +169,8 @@ JsonDocument to_json(const JobTerms& terms) {
     document["preview"] = {{"cloud", terms.preview_cloud}};
   else if (terms.session.empty())
     document["preview"] = {{"count", terms.preview_count}};
-  if (terms.format) document["output"] = {{"format", format_name(*terms.format)}};
+  if (terms.format) document["output"]["format"] = format_name(*terms.format);
+  if (terms.steps > 0) document["output"]["steps"] = terms.steps;
   return document;
 }
 
@@ -189,7 +193,8 @@ JobTerms job_terms(const Json& document) {
     terms.preview_count = preview->value("count", kUsualPreview);
   }
   if (const auto output = document.find("output"); output != document.end()) {
-    const std::string name = output->at("format").get<std::string>();
+    terms.steps = output->value("steps", std::uint64_t{0});
+    const std::string name = output->value("format", std::string());
     for (const CloudFormat format : kJobFormats)
       if (format_name(format) == name) terms.format = format;
   }

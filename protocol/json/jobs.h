@@ -28,6 +28,7 @@ inline constexpr std::array kJobFormats = {CloudFormat::kPly, CloudFormat::kLas,
                                            CloudFormat::kXyz};
 inline constexpr std::uint64_t kHighestPriority = 9;
 inline constexpr std::uint64_t kUsualPriority = 5;
+inline constexpr std::uint64_t kMostSteps = 1000;
 inline constexpr std::uint64_t kUsualPreview = 100'000;  ///< samples of a preview that a job makes itself
 inline constexpr std::string_view kLocalLauncher = "local";
 
@@ -45,7 +46,8 @@ struct JobTerms {
   double s = 1.0;
   Timing timing = Timing::kSequence;
   std::optional<CloudFormat> format = std::nullopt;  ///< of the result; none: the scan's, or PLY
-  std::string mode = {};                             ///< of kJobModeNames; empty: tiles where that can be
+  std::uint64_t steps = 0;  ///< clouds of an animation from s = 0 on; 0: one cloud
+  std::string mode = {};    ///< of kJobModeNames; empty: tiles where that can be
   std::string launcher = std::string(kLocalLauncher);
   std::uint64_t priority = kUsualPriority;
 };

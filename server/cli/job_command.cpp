@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <limits>
@@ -91,6 +92,16 @@ class ProgressLine {
   std::string phase_;
 };
 
+/// This process's memory at its highest; 0 where the system does not say.
+std::uint64_t peak_memory_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    std::uint64_t kibibytes = 0;
+    if (word == "VmHWM:" && status >> kibibytes) return kibibytes << 10U;
+  }
+  return 0;
+}
+
 protocol::JsonDocument to_json(const JobReport& report, double seconds) {
   return {{"mode", kModeNames[static_cast<std::size_t>(report.mode)]},
           {"sample_count", report.samples},
@@ -104,7 +115,9 @@ protocol::JsonDocument to_json(const JobReport& report, double seconds) {
             {"rms_difference", report.rms_difference},
             {"max_difference", report.max_difference}}},
           {"spacing", report.spacing},
-          {"seconds", seconds}};
+          {"files", report.files},
+          {"seconds", seconds},
+          {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 protocol::JsonDocument to_json(const JobEstimate& estimate) {
@@ -169,6 +182,11 @@ CLI::App* add_job_run(CLI::App& group, JobRunOptions& options) {
                       "how far the edits are played, 0 to 1; 1 where the file does not say");
   command->add_option("--timing", options.timing, "the edits one after the other, or all at once")
       ->check(CLI::IsMember({"sequence", "together"}));
+  command
+      ->add_option("--steps", options.steps,
+                   "an animation: so many clouds from s = 0 up to s, beside the result's name as "
+                   "name_0001.ply, name_0002.ply and so on")
+      ->check(CLI::Range(2U, kMaxJobSteps));
   command->add_option("--neighbors", options.neighbors, "of a sample's neighbourhood, 4 to 32")
       ->check(CLI::Range(4U, 32U))
       ->capture_default_str();
@@ -222,6 +240,7 @@ int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) 
     if (!preview) return refuse(options.preview + ": " + preview.error().message, 1);
     params.preview = std::make_shared<const Cloud>(std::move(preview.value().cloud));
   }
+  params.steps = options.steps;
   params.confined = options.confined;
   params.most_bytes = options.most_mebibytes << 20U;
   params.drop_non_finite = options.drop_non_finite;
@@ -266,7 +285,11 @@ int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) 
   if (report.tiles_kept > 0) out << " (" << report.tiles_kept << " were done already)";
   out << "\npreview     " << report.preview_samples << " samples; " << report.matched
       << " of them differ from the result by " << report.rms_difference << " rms, " << report.max_difference
-      << " at most\nspacing     " << report.spacing << "\ntime        " << seconds << " s\n";
+      << " at most\nspacing     " << report.spacing << "\ntime        " << seconds << " s, "
+      << (peak_memory_bytes() >> 20U) << " MiB at most\n";
+  if (report.files.size() > 1)
+    out << "files       " << report.files.size() << ", " << report.files.front() << " to "
+        << report.files.back() << "\n";
   return 0;
 }
 

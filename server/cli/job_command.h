@@ -16,9 +16,10 @@ struct JobRunOptions {
   std::string preview;  ///< a cloud file; empty: made of the input
   std::uint64_t preview_count = 100'000;
   std::uint32_t neighbors = 10;
-  std::string mode;         ///< tiles, memory, direct; empty: tiles where that can be
-  std::optional<double> s;  ///< none: as the file says, or all of it
-  std::string timing;       ///< sequence, together; empty: as the file says, or sequence
+  std::string mode;                    ///< tiles, memory, direct; empty: tiles where that can be
+  std::optional<double> s;             ///< none: as the file says, or all of it
+  std::string timing;                  ///< sequence, together; empty: as the file says, or sequence
+  std::optional<std::uint32_t> steps;  ///< an animation of so many clouds
   std::uint64_t memory_mebibytes = 1024;
   std::string work;  ///< a folder for scratch files; empty: beside the output
   int threads = 0;   ///< 0: all

@@ -39,6 +39,8 @@ bool read_pieces(int file, std::uint64_t size, const std::function<bool(std::spa
 
 /// Writes all of it where the open file's offset stands. False: errno says why.
 bool write_all(int file, std::span<const std::byte> bytes);
+/// The same at `offset` from the file's beginning, wherever its own stands.
+bool write_all_at(int file, std::span<const std::byte> bytes, std::uint64_t offset);
 
 /// Brings the names in a folder to the disk. False: the disk does not say so.
 bool sync_folder(const std::string& path);

@@ -70,22 +70,15 @@ class MemoryJob {
     report_.preview_samples = preview->size();
     const auto levels = hierarchy_for(params_.request.recipe, *preview, params_.neighbors);
     if (!levels.ok()) return levels.problem();
-    auto outcome = play_on_preview(params_.request, about(preview, cloud->origin), levels.value(), context_);
+    auto outcome = play_steps_on_preview(params_.request, params_.steps.value_or(1),
+                                         about(preview, cloud->origin), levels.value(), context_);
     if (!outcome.ok()) return outcome.problem();
-    PlayedRecipe& played = outcome.value();
+    PlayedSteps& played = outcome.value();
     played.script.spacing_ratio = static_cast<float>(
         std::min(1.0, std::sqrt(static_cast<double>(preview->size()) / static_cast<double>(cloud->size()))));
     report_.spacing = static_cast<double>(played.script.bases.spacing * played.script.spacing_ratio);
-    progress_("edits", 0.3);
-    auto edited = edit(cloud, levels.value(), played);
-    if (!edited) return protocol::to_problem(edited.error());
-    measure(*cloud, edited.value(), played);
-    progress_("writing", 0.9);
-    const Cloud result = edited_cloud(*cloud, edited.value());
-    auto bytes = write_cloud(result, format.value(), {.grid = grid});
-    if (!bytes) return protocol::to_problem(bytes.error());
-    if (auto written = write_file_atomically(params_.output, bytes.value()); !written)
-      return protocol::to_problem(written.error());
+    if (auto made = edit(cloud, levels.value(), played, {.grid = grid}, format.value()); !made)
+      return protocol::to_problem(made.error());
     progress_("done", 1.0);
     return report_;
   }
@@ -102,22 +95,48 @@ class MemoryJob {
     return moved;
   }
 
-  Result<Edited> edit(const std::shared_ptr<const Cloud>& cloud, const HierarchyParams& levels,
-                      const PlayedRecipe& played) const {
+  Result<void> edit(const std::shared_ptr<const Cloud>& cloud, const HierarchyParams& levels,
+                    PlayedSteps& played, const ExportParams& params, CloudFormat format) {
+    progress_("edits", 0.3);
     if (report_.mode == JobMode::kDirect) {
+      played.script.edits = played.steps.back().edits;
       auto state = edit_directly(played.script, cloud, levels, context_);
       if (!state) return state.error();
-      return Edited{.sampling = state.value().samples->sampling, .finest = state.value().surface->finest()};
+      const Edited edited{.sampling = state.value().samples->sampling,
+                          .finest = state.value().surface->finest()};
+      measure(*cloud, edited, played);
+      return write(*cloud, edited, params, format, params_.output);
     }
     const AnchorIndex anchors(played.script.rest);
-    auto made = transfer_edits(played.script, anchors, cloud, context_);
-    if (!made) return made.error();
-    return Edited{.sampling = std::move(made.value().sampling),
-                  .finest = std::move(made.value().surface.levels.back())};
+    auto rest = decompose_samples(played.script, anchors, cloud, context_);
+    if (!rest) return rest.error();
+    const std::vector<std::string> outputs = outputs_of(params_);
+    for (std::size_t k = 0; k < outputs.size(); ++k) {
+      progress_("edits", 0.3 + 0.7 * static_cast<double>(k) / static_cast<double>(outputs.size()));
+      const bool is_last = k + 1 == outputs.size();
+      auto made = make_edits(played.script, played.steps[k].edits,
+                             is_last ? std::move(rest).value() : rest.value(), context_);
+      if (!made) return made.error();
+      const Edited edited{.sampling = std::move(made.value().sampling),
+                          .finest = std::move(made.value().surface.levels.back())};
+      if (is_last) measure(*cloud, edited, played);
+      if (auto written = write(*cloud, edited, params, format, outputs[k]); !written) return written.error();
+    }
+    return {};
+  }
+
+  Result<void> write(const Cloud& cloud, const Edited& edited, const ExportParams& params, CloudFormat format,
+                     const std::string& output) {
+    auto bytes = write_cloud(edited_cloud(cloud, edited), format, params);
+    if (!bytes) return bytes.error();
+    if (auto written = write_file_atomically(output, bytes.value()); !written) return written.error();
+    report_.files.push_back(output);
+    return {};
   }
 
   /// Samples that moved and that were inserted; how far the preview's came apart from the same ones here.
-  void measure(const Cloud& cloud, const Edited& edited, const PlayedRecipe& played) {
+  void measure(const Cloud& cloud, const Edited& edited, const PlayedSteps& played) {
+    const Points& result = played.steps.back().result;
     const std::vector<std::uint32_t>& ids = edited.sampling->cloud->id;
     const std::size_t kept = std::min(cloud.size(), ids.size());
     // What was there before comes first, in its order; what was collected is missing.
@@ -139,7 +158,7 @@ class MemoryJob {
           std::sqrt(static_cast<double>(found.front().distance_sq)) > report_.spacing)
         continue;
       const Vec3f here = edited.finest.position[place[i]] - cloud.position[i];
-      differences.add(static_cast<double>((here - (played.result[a] - played.rest[a])).norm()));
+      differences.add(static_cast<double>((here - (result[a] - played.rest[a])).norm()));
     }
     differences.report(report_);
   }
@@ -152,12 +171,35 @@ class MemoryJob {
 
 }  // namespace
 
+std::vector<std::string> outputs_of(const JobParams& params) {
+  if (!params.steps) return {params.output};
+  const std::filesystem::path output(params.output);
+  std::vector<std::string> names;
+  for (std::uint32_t k = 1; k <= *params.steps; ++k) {
+    std::string number = std::to_string(k);
+    number.insert(0, 4 - std::min<std::size_t>(4, number.size()), '0');
+    std::filesystem::path name = output;
+    name.replace_filename(output.stem().string() + "_" + number + output.extension().string());
+    names.push_back(name.string());
+  }
+  return names;
+}
+
 Outcome<ChosenMode> choose_mode(const JobParams& params) {
   const bool splits = resamples(params.request);
-  const bool same_file =
-      std::filesystem::exists(params.output) && std::filesystem::equivalent(params.input, params.output);
-  if (same_file)
-    return Problem{.kind = ProblemKind::kInvalidValue, .detail = "a job does not write over its own input"};
+  if (params.steps && (*params.steps < 2 || *params.steps > kMaxJobSteps))
+    return Problem{.kind = ProblemKind::kInvalidValue,
+                   .detail = "steps must lie between 2 and " + std::to_string(kMaxJobSteps),
+                   .limit = static_cast<double>(kMaxJobSteps),
+                   .actual = static_cast<double>(*params.steps)};
+  if (params.steps && params.mode == JobMode::kDirect)
+    return Problem{.kind = ProblemKind::kInvalidValue,
+                   .detail = "steps are made in tiles or in memory, not in the mode direct"};
+  for (const std::string& output : outputs_of(params)) {
+    std::error_code ignored;
+    if (std::filesystem::equivalent(params.input, output, ignored))
+      return Problem{.kind = ProblemKind::kInvalidValue, .detail = "a job does not write over its own input"};
+  }
   if (params.mode && *params.mode != JobMode::kTiles)
     return ChosenMode{.mode = *params.mode, .file = {}, .records = {}};
   if (splits && params.mode)

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "engine/core/cloud.h"
 #include "engine/core/execution_context.h"
@@ -39,9 +40,15 @@ struct JobParams {
   bool confined = false;
   std::uint64_t most_bytes = 0;  ///< of memory, for the report and the decoder; 0: all
   bool drop_non_finite = false;  ///< in the modes memory and direct
+  /// An animation: so many clouds, 2 to kMaxJobSteps, of the recipe at s = 0 up to request.s in even steps.
+  std::optional<std::uint32_t> steps = std::nullopt;
 };
+inline constexpr std::uint32_t kMaxJobSteps = 1000;
 
-/// What was done. Lengths are in model units.
+/// What the job writes: its output, or of an animation to edited.ply edited_0001.ply and so on.
+std::vector<std::string> outputs_of(const JobParams& params);
+
+/// What was done; of an animation the numbers are those of its last cloud. Lengths are in model units.
 struct JobReport {
   JobMode mode = JobMode::kTiles;
   std::uint64_t samples = 0;
@@ -54,7 +61,8 @@ struct JobReport {
   std::uint64_t matched = 0;
   double rms_difference = 0.0;
   double max_difference = 0.0;
-  double spacing = 0.0;  ///< the scan's typical one, to compare them with
+  double spacing = 0.0;            ///< the scan's typical one, to compare them with
+  std::vector<std::string> files;  ///< that were written, in the order of s
 };
 
 /// What a job will take. Of the modes memory and direct it is an estimate.
@@ -73,12 +81,14 @@ Outcome<JobEstimate> estimate_full_resolution(const JobParams& params, const Exe
 /// Where a job stands; called between phases and tiles.
 using JobProgress = std::function<void(const std::string& phase, double fraction)>;
 
-/// Runs the job to its end. The output appears whole or not at all. In tiles a job that was interrupted
+/// Runs the job to its end. The output appears whole or not at all, an animation's clouds one after the other
+/// once all of them are made. An animation decomposes the scan once; its last cloud is the plain job's. In tiles a job that was interrupted
 /// goes on where it was, where its folder, its input and its recipe are the same; the folder is removed in
 /// the end.
 /// Problems:    those of reading the input, of play_on_preview and of writing; kCancelled
 /// Promises:    samples that no edit moved keep their bytes; a recipe without effect gives the input's bytes
-/// Cost:        two passes over the input, 32 bytes of disk a sample and as many for each that moves
+/// Cost:        two passes over the input, 32 bytes of disk a sample and, for each cloud that is written, as
+///              many for each that moves
 /// Determinism: the same bytes for any number of threads; memory_bytes, which says how large tiles are, may
 ///              change what a tile's neighbours at its border are taken to be
 Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionContext& context,

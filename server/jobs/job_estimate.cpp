@@ -53,21 +53,22 @@ Outcome<JobEstimate> estimate_full_resolution(const JobParams& params, const Exe
   JobEstimate estimate{.mode = chosen.value().mode};
   std::error_code none;
   const std::uint64_t bytes = std::filesystem::file_size(params.input, none);
+  const std::uint64_t clouds = params.steps.value_or(1);
   if (chosen.value().records) {
     estimate.samples = chosen.value().records->count;
     estimate.memory_bytes = params.memory_bytes;
-    estimate.disk_bytes = estimate.samples * kSpoolBytes + bytes;
+    estimate.disk_bytes = estimate.samples * kSpoolBytes + clouds * bytes;
   } else {
     const auto scan = read_scan(params);
     if (!scan) return protocol::to_problem(scan.error());
     estimate.samples = scan.value().cloud.size();
     estimate.memory_bytes = memory_of(scan.value().cloud) + estimate.samples * kWorkingBytes;
-    estimate.disk_bytes = memory_of(scan.value().cloud);
+    estimate.disk_bytes = clouds * memory_of(scan.value().cloud);
   }
   const auto each = seconds_per_sample(params, context);
   if (!each.ok()) return each.problem();
-  estimate.seconds =
-      each.value() * static_cast<double>(estimate.samples) + kSecondsPerByte * static_cast<double>(bytes);
+  estimate.seconds = static_cast<double>(clouds) * (each.value() * static_cast<double>(estimate.samples) +
+                                                    kSecondsPerByte * static_cast<double>(bytes));
   const auto space = std::filesystem::space(place_of(params.folder), none);
   if (!none) estimate.free_disk_bytes = space.available;
   return estimate;

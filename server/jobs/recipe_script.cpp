@@ -67,9 +67,22 @@ class Player {
                .edits = {},
                .neighbors = rest_.params.neighbors,
                .spacing_ratio = 1.0F};
-    made_ = state_at_rest(cloud_, std::move(hierarchy));
-    shared_ids_ = rest_.uploaded_ids = made_.samples->sampling->next_id;
-    whole_ = made_;
+    at_rest_ = state_at_rest(cloud_, std::move(hierarchy));
+    rest_.uploaded_ids = at_rest_.samples->sampling->next_id;
+    return std::nullopt;
+  }
+
+  /// The recipe up to request.s, from rest.
+  std::optional<Problem> play(const protocol::RecipeRequest& request) {
+    whole_ = made_ = at_rest_;
+    made_is_whole_ = true;
+    shared_ids_ = rest_.uploaded_ids;
+    marks_ = nullptr;
+    script_.edits.clear();
+    const std::vector<double> parts = parts_of_recipe(request);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (auto problem = add(i, request.recipe.edits[i], parts[i], i + 1 < parts.size())) return problem;
+    }
     return std::nullopt;
   }
 
@@ -97,6 +110,12 @@ class Player {
     marks_ = carried_marks(*painted, marks_, *whole_.samples);
     return std::nullopt;
   }
+
+  /// The edits and the preview's samples as play() left them.
+  PlayedSteps::Step step() {
+    return {.edits = std::exchange(script_.edits, {}), .result = made_.surface->finest().position};
+  }
+  EditScript script() { return std::move(script_); }
 
   PlayedRecipe finish() {
     return {.script = std::move(script_),
@@ -126,8 +145,11 @@ class Player {
     if (!after) return after.error();
     if (auto reach = check_reach(*after.value().surface, params.level); !reach) return reach.error();
     if (script != nullptr)
-      script->edits.push_back(
-          {.params = params, .regions = *field.value().regions, .derived = std::move(derived_)});
+      script->edits.push_back({.params = params,
+                               .regions = field.value().regions,
+                               .derived = derived_.bands.empty()
+                                              ? nullptr
+                                              : std::make_shared<const LevelBases>(std::move(derived_))});
     return after;
   }
 
@@ -137,6 +159,7 @@ class Player {
   RestModel rest_;
   LevelBases derived_;  // what the last derivation of levels was made of
   EditScript script_;
+  SurfaceState at_rest_;
   SurfaceState whole_;  // with all edits so far whole: what paintings are made on
   SurfaceState made_;   // with the parts that were asked for
   bool made_is_whole_ = true;
@@ -166,12 +189,39 @@ Outcome<PlayedRecipe> play_on_preview(const protocol::RecipeRequest& request,
                                       const ExecutionContext& context) {
   Player player(std::move(preview), params, context);
   if (auto problem = player.start()) return *problem;
-  const std::vector<RecipeEdit>& edits = request.recipe.edits;
-  const std::vector<double> parts = parts_of_recipe(request);
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (auto problem = player.add(i, edits[i], parts[i], i + 1 < parts.size())) return *problem;
-  }
+  if (auto problem = player.play(request)) return *problem;
   return player.finish();
+}
+
+Outcome<PlayedSteps> play_steps_on_preview(const protocol::RecipeRequest& request, std::uint32_t count,
+                                           std::shared_ptr<const Cloud> preview,
+                                           const HierarchyParams& params, const ExecutionContext& context) {
+  PlayedSteps played;
+  played.rest = preview->position;
+  Player player(std::move(preview), params, context);
+  if (auto problem = player.start()) return *problem;
+  protocol::RecipeRequest part = request;
+  std::vector<double> last_parts;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    // The last one is request.s to the bit.
+    if (k + 1 < count)
+      part.s = request.s * static_cast<double>(k) / static_cast<double>(count - 1);
+    else
+      part.s = request.s;
+    if (auto problem = player.play(part)) return *problem;
+    PlayedSteps::Step step = player.step();
+    // Regions and levels are those of the step before as far as the edits before them are.
+    const std::vector<double> parts = parts_of_recipe(part);
+    for (std::size_t i = 0; k > 0 && i < std::min(parts.size(), last_parts.size()); ++i) {
+      step.edits[i].regions = played.steps.back().edits[i].regions;
+      step.edits[i].derived = played.steps.back().edits[i].derived;
+      if (parts[i] != last_parts[i]) break;
+    }
+    last_parts = parts;
+    played.steps.push_back(std::move(step));
+  }
+  played.script = player.script();
+  return played;
 }
 
 Result<SurfaceState> edit_directly(const EditScript& script, std::shared_ptr<const Cloud> cloud,
@@ -187,8 +237,8 @@ Result<SurfaceState> edit_directly(const EditScript& script, std::shared_ptr<con
     state = std::move(ready).value();
     const Points& position = state.surface->levels[edit.params.level].position;
     const RegionField field{.t = std::make_shared<const ScaleField>(
-                                compute_scale_field(position, edit.regions, edit.params.blend, &context)),
-                            .regions = std::make_shared<const RegionPair>(edit.regions),
+                                compute_scale_field(position, *edit.regions, edit.params.blend, &context)),
+                            .regions = edit.regions,
                             .samples = state.samples};
     if (context.is_cancelled()) return cancelled_error();
     auto after = edited(rest, state, edit.params, field, ResamplingEffort::kExact, context);

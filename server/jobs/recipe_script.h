@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "engine/core/cloud.h"
 #include "engine/core/execution_context.h"
@@ -35,6 +36,23 @@ Outcome<HierarchyParams> hierarchy_for(const protocol::Recipe& recipe, const Clo
 Outcome<PlayedRecipe> play_on_preview(const protocol::RecipeRequest& request,
                                       std::shared_ptr<const Cloud> preview, const HierarchyParams& params,
                                       const ExecutionContext& context);
+
+/// A recipe's course from s = 0: one script, and the edits of each step.
+struct PlayedSteps {
+  struct Step {
+    std::vector<TransferredEdit> edits;
+    Points result;  ///< the preview's own samples
+  };
+  EditScript script;  ///< without edits
+  Points rest;        ///< the preview's own samples
+  std::vector<Step> steps;
+};
+
+/// Step k of count is the recipe at s = request.s k / (count - 1), as play_on_preview makes it; a single one is
+/// request.s itself. What steps have in common is kept once.
+Outcome<PlayedSteps> play_steps_on_preview(const protocol::RecipeRequest& request, std::uint32_t count,
+                                           std::shared_ptr<const Cloud> preview,
+                                           const HierarchyParams& params, const ExecutionContext& context);
 
 /// The script's edits on levels of the cloud's own, with the preview's regions: volumes, whatever the
 /// sampling.

@@ -13,24 +13,26 @@ const float* column(const Points& points, int axis) {
 
 }  // namespace
 
-TileCuts::TileCuts(const Points& samples, std::size_t most) {
-  constexpr float kEverywhere = std::numeric_limits<float>::infinity();
+TileCuts::TileCuts(const Points& samples, std::size_t most, std::size_t most_of_cell) {
   std::vector<std::uint32_t> order(samples.size());
   std::iota(order.begin(), order.end(), 0U);
-  Box3f space;
-  space.min = Vec3f::Constant(-kEverywhere);
-  space.max = Vec3f::Constant(kEverywhere);
   nodes_.emplace_back();
-  divide(samples, order, 0, order.size(), std::max<std::size_t>(most, 1), space, 0);
+  const Most each{.tile = std::max<std::size_t>(most, 1), .cell = std::max<std::size_t>(most_of_cell, 1)};
+  divide(samples, order, 0, order.size(), each, false, 0);
 }
 
 void TileCuts::divide(const Points& samples, std::vector<std::uint32_t>& order, std::size_t begin,
-                      std::size_t end, std::size_t most, const Box3f& space, std::uint32_t node) {
-  const auto leaf = [&] {
-    nodes_[node].below = static_cast<std::uint32_t>(boxes_.size());
-    boxes_.push_back(space);
+                      std::size_t end, Most most, bool in_tile, std::uint32_t node) {
+  const auto open_tile = [&] {
+    if (!in_tile) first_cells_.push_back(cell_count_);
+    in_tile = true;
   };
-  if (end - begin <= most) return leaf();
+  const auto leaf = [&] {
+    open_tile();
+    nodes_[node].below = cell_count_++;
+  };
+  if (end - begin <= most.tile) open_tile();
+  if (in_tile && end - begin <= most.cell) return leaf();
   Box3f box;
   for (std::size_t i = begin; i < end; ++i) box.extend(samples[order[i]]);
   int axis = 0;
@@ -50,41 +52,37 @@ void TileCuts::divide(const Points& samples, std::vector<std::uint32_t>& order, 
   }
   const auto middle = std::partition(first, last, [&](std::uint32_t i) { return values[i] < cut; });
   const auto split = static_cast<std::size_t>(middle - order.begin());
-  Box3f below = space;
-  Box3f above = space;
-  below.max[axis] = cut;
-  above.min[axis] = cut;
   nodes_[node].cut = cut;
   nodes_[node].axis = axis;
   nodes_[node].below = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
-  divide(samples, order, begin, split, most, below, nodes_[node].below);
+  divide(samples, order, begin, split, most, in_tile, nodes_[node].below);
   nodes_[node].above = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
-  divide(samples, order, split, end, most, above, nodes_[node].above);
+  divide(samples, order, split, end, most, in_tile, nodes_[node].above);
 }
 
-std::uint32_t TileCuts::tile_of(const Vec3f& p) const {
+std::uint32_t TileCuts::cell_of(const Vec3f& p) const {
   const Node* node = nodes_.data();
   while (node->axis >= 0) node = &nodes_[p[node->axis] < node->cut ? node->below : node->above];
   return node->below;
 }
 
-std::vector<std::uint32_t> TileCuts::tiles_in(const Box3f& box) const {
-  std::vector<std::uint32_t> tiles;
+std::vector<std::uint32_t> TileCuts::cells_in(const Box3f& box) const {
+  std::vector<std::uint32_t> cells;
   std::vector<std::uint32_t> open{0};
   while (!open.empty()) {
     const Node& node = nodes_[open.back()];
     open.pop_back();
     if (node.axis < 0) {
-      tiles.push_back(node.below);
+      cells.push_back(node.below);
       continue;
     }
     if (box.max[node.axis] >= node.cut) open.push_back(node.above);
     if (box.min[node.axis] < node.cut) open.push_back(node.below);
   }
-  std::sort(tiles.begin(), tiles.end());
-  return tiles;
+  std::sort(cells.begin(), cells.end());
+  return cells;
 }
 
 }  // namespace pointwright::server

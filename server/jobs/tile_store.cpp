@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <limits>
@@ -20,7 +21,8 @@ namespace pointwright::server {
 namespace {
 
 constexpr std::uint64_t kChunk = std::uint64_t{1} << 21U;  // samples that are sorted together
-constexpr std::uint64_t kIndexMagic = 0x31584449'54575054ULL;
+constexpr std::size_t kChunksAtOnce = 2;
+constexpr std::uint64_t kIndexMagic = 0x32584449'54575054ULL;
 constexpr std::uint64_t kResultMagic = 0x31534552'54575054ULL;
 constexpr std::size_t kProbes = 64;  // blocks of samples whose neighbourhoods say how wide a ring is
 
@@ -70,6 +72,13 @@ float ring_width(const Points& position, std::uint32_t neighbors, float least) {
   return std::max(least, 1.25F * *most);
 }
 
+template <typename Work>
+void for_each(std::size_t count, const Work& work) {
+  parallel_for(count, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) work(i);
+  });
+}
+
 Vec3f place_of(const TileSample& sample) {
   return {sample.position[0], sample.position[1], sample.position[2]};
 }
@@ -77,11 +86,18 @@ Vec3f place_of(const TileSample& sample) {
 }  // namespace
 
 TileStore::TileStore(std::string folder, TileCuts cuts, const Vec3d& origin)
-    : folder_(std::move(folder)), cuts_(std::move(cuts)), origin_(origin), extents_(cuts_.tile_count()) {}
+    : folder_(std::move(folder)), cuts_(std::move(cuts)), origin_(origin), extents_(cuts_.cell_count()) {}
+
+std::uint64_t TileStore::cell_samples(std::size_t cell) const {
+  std::uint64_t count = 0;
+  for (const Extent& extent : extents_[cell]) count += extent.count;
+  return count;
+}
 
 std::uint64_t TileStore::sample_count(std::size_t tile) const {
   std::uint64_t count = 0;
-  for (const Extent& extent : extents_[tile]) count += extent.count;
+  for (std::size_t cell = cuts_.first_cell(tile); cell < cuts_.first_cell(tile + 1); ++cell)
+    count += cell_samples(cell);
   return count;
 }
 
@@ -108,9 +124,9 @@ bool TileStore::read_index() {
     return true;
   };
   std::array<std::uint64_t, 2> head{};
-  if (!take(head.data(), sizeof head) || head[0] != kIndexMagic || head[1] != cuts_.tile_count())
+  if (!take(head.data(), sizeof head) || head[0] != kIndexMagic || head[1] != cuts_.cell_count())
     return false;
-  std::vector<std::vector<Extent>> extents(cuts_.tile_count());
+  std::vector<std::vector<Extent>> extents(cuts_.cell_count());
   for (auto& list : extents) {
     std::uint64_t count = 0;
     if (!take(&count, sizeof count) || count > rest.size() / sizeof(Extent)) return false;
@@ -131,151 +147,196 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
   const std::string path = spool_path(folder_);
   const Descriptor spool = opened(path, O_WRONLY | O_CREAT | O_TRUNC);
   if (!spool.is_open()) return file_error("cannot write", path, errno);
-  extents_.assign(cuts_.tile_count(), {});
   const std::byte* const first = file.bytes().data() + records.begin;
-  std::vector<std::uint32_t> tiles;
-  std::vector<TileSample> unsorted;
-  std::vector<TileSample> sorted;
-  std::vector<std::uint64_t> place(cuts_.tile_count() + 1);
-  for (std::uint64_t begin = 0; begin < records.count; begin += kChunk) {
-    if (context.is_cancelled()) return cancelled_error();
-    const std::uint64_t end = std::min(records.count, begin + kChunk);
-    const auto count = static_cast<std::size_t>(end - begin);
-    tiles.resize(count);
-    unsorted.resize(count);
-    sorted.resize(count);
-    parallel_for(count, [&](std::size_t from, std::size_t to) {
-      for (std::size_t i = from; i < to; ++i) {
-        const std::byte* const record = first + (begin + i) * records.record_bytes;
+  // Every chunk has its place in the spool, so they may be sorted and written side by side.
+  const auto chunks = static_cast<std::size_t>((records.count + kChunk - 1) / kChunk);
+  std::vector<std::vector<std::pair<std::uint32_t, Extent>>> extents(chunks);
+  std::atomic<std::size_t> next{0};
+  std::atomic<int> failure{0};  // errno
+  const auto sort_chunks = [&] {
+    std::vector<std::uint32_t> cells;
+    std::vector<TileSample> sorted;
+    std::vector<std::size_t> place(cuts_.cell_count() + 1);
+    for (std::size_t chunk = next++; chunk < chunks; chunk = next++) {
+      if (context.is_cancelled() || failure != 0) return;
+      const std::uint64_t begin = chunk * kChunk;
+      const auto count = static_cast<std::size_t>(std::min(kChunk, records.count - begin));
+      const auto place_of_record = [&](const std::byte* record) {
         // At origin 0 the cast alone keeps a negative zero.
         const Vec3d p = records.position(record);
-        const Vec3f q = Vec3d((origin_.array() == 0.0).select(p, p - origin_)).cast<float>();
-        const Vec3f n = records.has_normals() ? records.normal(record) : Vec3f(Vec3f::Zero());
-        unsorted[i] = {
-            .index = begin + i, .position = {q.x(), q.y(), q.z()}, .normal = {n.x(), n.y(), n.z()}};
-        tiles[i] = cuts_.tile_of(q);
+        return Vec3f(Vec3d((origin_.array() == 0.0).select(p, p - origin_)).cast<float>());
+      };
+      const std::byte* const from = first + begin * records.record_bytes;
+      cells.resize(count);
+      sorted.resize(count);
+      parallel_for(count, [&](std::size_t block, std::size_t end) {
+        for (std::size_t i = block; i < end; ++i)
+          cells[i] = cuts_.cell_of(place_of_record(from + i * records.record_bytes));
+      });
+      std::fill(place.begin(), place.end(), 0U);
+      for (const std::uint32_t cell : cells) ++place[cell + 1];
+      for (std::uint32_t cell = 0; cell < cuts_.cell_count(); ++cell) {
+        if (place[cell + 1] > 0)
+          extents[chunk].emplace_back(cell, Extent{.first = begin + place[cell], .count = place[cell + 1]});
+        place[cell + 1] += place[cell];
       }
-    });
-    std::fill(place.begin(), place.end(), 0U);
-    for (const std::uint32_t tile : tiles) ++place[tile + 1];
-    for (std::size_t tile = 0; tile < cuts_.tile_count(); ++tile) {
-      if (place[tile + 1] > 0)
-        extents_[tile].push_back({.first = begin + place[tile], .count = place[tile + 1]});
-      place[tile + 1] += place[tile];
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::byte* const record = from + i * records.record_bytes;
+        const Vec3f p = place_of_record(record);
+        const Vec3f n = records.has_normals() ? records.normal(record) : Vec3f(Vec3f::Zero());
+        sorted[place[cells[i]]++] = {
+            .index = begin + i, .position = {p.x(), p.y(), p.z()}, .normal = {n.x(), n.y(), n.z()}};
+      }
+      if (!write_all_at(spool.get(), std::as_bytes(std::span(sorted)), begin * sizeof(TileSample)))
+        failure = errno;
+      file.release(records.begin + begin * records.record_bytes,
+                   records.begin + (begin + count) * records.record_bytes);
     }
-    for (std::size_t i = 0; i < count; ++i) sorted[place[tiles[i]]++] = unsorted[i];
-    if (!write_all(spool.get(), std::as_bytes(std::span(sorted))))
-      return file_error("cannot write", path, errno);
-    file.release(records.begin + begin * records.record_bytes, records.begin + end * records.record_bytes);
-  }
+  };
+  parallel_for(
+      kChunksAtOnce, [&](std::size_t, std::size_t) { sort_chunks(); }, 1);
+  if (context.is_cancelled()) return cancelled_error();
+  if (failure != 0) return file_error("cannot write", path, failure);
   if (::fsync(spool.get()) != 0) return file_error("cannot write", path, errno);
+  extents_.assign(cuts_.cell_count(), {});
+  for (const auto& of_chunk : extents)
+    for (const auto& [cell, extent] : of_chunk) extents_[cell].push_back(extent);
   return write_file_atomically(index_path(folder_), index_bytes());
 }
 
-Result<void> TileStore::read_samples(std::size_t tile, std::vector<TileSample>& samples) const {
-  const std::string path = spool_path(folder_);
-  const Descriptor spool = opened(path, O_RDONLY);
-  if (!spool.is_open()) return file_error("cannot read", path, errno);
-  std::size_t at = samples.size();
-  samples.resize(at + static_cast<std::size_t>(sample_count(tile)));
-  for (const Extent& extent : extents_[tile]) {
-    auto* to = reinterpret_cast<char*>(samples.data() + at);
+bool TileStore::read_cell(int spool, std::size_t cell, TileSample* to) const {
+  for (const Extent& extent : extents_[cell]) {
+    auto* at = reinterpret_cast<char*>(to);
     std::uint64_t left = extent.count * sizeof(TileSample);
     std::uint64_t from = extent.first * sizeof(TileSample);
     while (left > 0) {
-      const ssize_t got = ::pread(spool.get(), to, static_cast<std::size_t>(left), static_cast<off_t>(from));
+      const ssize_t got = ::pread(spool, at, static_cast<std::size_t>(left), static_cast<off_t>(from));
       if (got < 0 && errno == EINTR) continue;
-      if (got <= 0) {
-        if (got == 0) errno = EIO;
-        return file_error("cannot read", path, errno);
-      }
-      to += got;
+      if (got == 0) errno = EIO;
+      if (got <= 0) return false;
+      at += got;
       from += static_cast<std::uint64_t>(got);
       left -= static_cast<std::uint64_t>(got);
     }
-    at += static_cast<std::size_t>(extent.count);
+    to += extent.count;
   }
-  return {};
+  return true;
+}
+
+Result<std::vector<TileSample>> TileStore::read_around(
+    std::size_t tile, const std::function<Box3f(std::span<const TileSample>)>& widened) const {
+  const std::string path = spool_path(folder_);
+  const Descriptor spool = opened(path, O_RDONLY);
+  if (!spool.is_open()) return file_error("cannot read", path, errno);
+  std::atomic<int> failure{0};  // errno
+  const std::size_t first = cuts_.first_cell(tile);
+  const std::size_t last = cuts_.first_cell(tile + 1);
+  std::vector<std::size_t> place{0};
+  for (std::size_t cell = first; cell < last; ++cell)
+    place.push_back(place.back() + static_cast<std::size_t>(cell_samples(cell)));
+  std::vector<TileSample> samples(place.back());
+  parallel_for(
+      last - first,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k)
+          if (!read_cell(spool.get(), first + k, samples.data() + place[k])) failure = errno;
+      },
+      1);
+  if (failure != 0) return file_error("cannot read", path, failure);
+  const Box3f box = widened(samples);
+  std::vector<std::uint32_t> others = cuts_.cells_in(box);
+  std::erase_if(others, [&](std::uint32_t cell) { return cell >= first && cell < last; });
+  std::vector<std::vector<TileSample>> around(others.size());
+  parallel_for(
+      others.size(),
+      [&](std::size_t begin, std::size_t end) {
+        std::vector<TileSample> all;
+        for (std::size_t k = begin; k < end; ++k) {
+          all.resize(static_cast<std::size_t>(cell_samples(others[k])));
+          if (!read_cell(spool.get(), others[k], all.data())) failure = errno;
+          for (const TileSample& sample : all) {
+            const Vec3f p = place_of(sample);
+            if ((p.array() >= box.min.array()).all() && (p.array() <= box.max.array()).all())
+              around[k].push_back(sample);
+          }
+        }
+      },
+      1);
+  if (failure != 0) return file_error("cannot read", path, failure);
+  for (const auto& more : around) samples.insert(samples.end(), more.begin(), more.end());
+  return samples;
 }
 
 Result<TileInput> TileStore::load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
                                   float least_ring, bool has_normals) const {
-  std::vector<TileSample> samples;
-  if (auto read = read_samples(tile, samples); !read) return read.error();
-  TileInput input;
-  input.own = samples.size();
-  Points own(samples.size());
-  Box3f box;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    own.set(i, place_of(samples[i]));
-    box.extend(own[i]);
-  }
-  const std::vector<std::uint32_t> own_order = coherent_order(own);
-  Points coherent(own.size());
-  for (std::size_t i = 0; i < own.size(); ++i) coherent.set(i, own[own_order[i]]);
-  const float halo = static_cast<float>(rings) * ring_width(coherent, neighbors, least_ring);
-  box.min.array() -= halo;
-  box.max.array() += halo;
-  std::vector<TileSample> others;
-  for (const std::uint32_t other : cuts_.tiles_in(box)) {
-    if (other == tile) continue;
-    others.clear();
-    if (auto read = read_samples(other, others); !read) return read.error();
-    for (const TileSample& sample : others) {
-      const Vec3f p = place_of(sample);
-      if ((p.array() >= box.min.array()).all() && (p.array() <= box.max.array()).all())
-        samples.push_back(sample);
-    }
-  }
+  std::size_t own_count = 0;
+  const auto read = read_around(tile, [&](std::span<const TileSample> own_samples) {
+    own_count = own_samples.size();
+    Points own(own_count);
+    for_each(own_count, [&](std::size_t i) { own.set(i, place_of(own_samples[i])); });
+    const std::vector<std::uint32_t> order = coherent_order(own);
+    Points coherent(own_count);
+    for_each(own_count, [&](std::size_t i) { coherent.set(i, own[order[i]]); });
+    Box3f box = bounds_of(own);
+    const float halo = static_cast<float>(rings) * ring_width(coherent, neighbors, least_ring);
+    box.min.array() -= halo;
+    box.max.array() += halo;
+    return box;
+  });
+  if (!read) return read.error();
+  const std::vector<TileSample>& samples = read.value();
+  const std::size_t count = samples.size();
   // By index first: what follows must not depend on the order of tiles.
-  std::vector<std::uint8_t> is_own(samples.size(), 0);
-  std::fill_n(is_own.begin(), input.own, std::uint8_t{1});
-  std::vector<std::uint64_t> keys(samples.size());
-  std::vector<std::uint32_t> order(samples.size());
-  for (std::size_t i = 0; i < samples.size(); ++i) {
+  std::vector<std::uint64_t> keys(count);
+  std::vector<std::uint32_t> order(count);
+  for_each(count, [&](std::size_t i) {
     keys[i] = samples[i].index;
     order[i] = static_cast<std::uint32_t>(i);
-  }
+  });
   sort_by_key(keys, order);
+  Points position(count);
+  for_each(count, [&](std::size_t i) { position.set(i, place_of(samples[order[i]])); });
+  const std::vector<std::uint32_t> coherent = coherent_order(position);
+  TileInput input;
   auto cloud = std::make_shared<Cloud>();
   cloud->origin = origin_;
-  Points position(samples.size());
-  for (std::size_t i = 0; i < samples.size(); ++i) position.set(i, place_of(samples[order[i]]));
-  const std::vector<std::uint32_t> coherent_all = coherent_order(position);
-  cloud->position.resize(samples.size());
-  if (has_normals) cloud->normal.resize(samples.size());
-  cloud->id.resize(samples.size());
-  input.index.resize(samples.size());
-  input.is_own.resize(samples.size());
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const TileSample& sample = samples[order[coherent_all[i]]];
+  cloud->position.resize(count);
+  if (has_normals) cloud->normal.resize(count);
+  cloud->id.resize(count);
+  input.index.resize(count);
+  std::vector<std::uint32_t> place(count);  // in the cloud, of each by index
+  for_each(count, [&](std::size_t i) {
+    const TileSample& sample = samples[order[coherent[i]]];
     cloud->position.set(i, place_of(sample));
     if (has_normals) cloud->normal.set(i, {sample.normal[0], sample.normal[1], sample.normal[2]});
     cloud->id[i] = static_cast<std::uint32_t>(i);
     input.index[i] = sample.index;
-    input.is_own[i] = is_own[order[coherent_all[i]]];
-  }
+    place[coherent[i]] = static_cast<std::uint32_t>(i);
+  });
+  input.by_index.reserve(own_count);
+  for (std::size_t k = 0; k < count; ++k)
+    if (order[k] < own_count) input.by_index.push_back(place[k]);
   input.cloud = std::move(cloud);
   return input;
 }
 
-std::string TileStore::result_path(std::size_t tile) const {
-  return folder_ + "/tile-" + std::to_string(tile) + ".result";
+std::string TileStore::result_path(std::size_t tile, std::size_t step) const {
+  return folder_ + "/tile-" + std::to_string(tile) + "-" + std::to_string(step) + ".result";
 }
 
-bool TileStore::has_result(std::size_t tile) const {
+bool TileStore::has_result(std::size_t tile, std::size_t step) const {
   struct stat status {};
-  return ::stat(result_path(tile).c_str(), &status) == 0;
+  return ::stat(result_path(tile, step).c_str(), &status) == 0;
 }
 
-Result<void> TileStore::put_result(std::size_t tile, const TileResult& result) const {
+Result<void> TileStore::put_result(std::size_t tile, std::size_t step, const TileResult& result) const {
   std::vector<std::byte> bytes;
   bytes.reserve(24 + result.moved.size() * sizeof(TileSample) + result.matches.size() * sizeof(PreviewMatch));
   const std::array<std::uint64_t, 3> head{kResultMagic, result.moved.size(), result.matches.size()};
   append(bytes, head.data(), head.size());
   append(bytes, result.moved.data(), result.moved.size());
   append(bytes, result.matches.data(), result.matches.size());
-  return write_file_atomically(result_path(tile), bytes);
+  return write_file_atomically(result_path(tile, step), bytes);
 }
 
 Result<TileResultView> view_result(std::span<const std::byte> bytes) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -41,10 +42,9 @@ struct TileResult {
 
 /// The samples that one tile's work needs.
 struct TileInput {
-  std::shared_ptr<const Cloud> cloud;  ///< own samples and those around them, in coherent order
-  std::vector<std::uint64_t> index;    ///< in the scan, of each
-  std::vector<std::uint8_t> is_own;    ///< of each
-  std::size_t own = 0;
+  std::shared_ptr<const Cloud> cloud;   ///< own samples and those around them, in coherent order
+  std::vector<std::uint64_t> index;     ///< in the scan, of each
+  std::vector<std::uint32_t> by_index;  ///< the tile's own samples, in the scan's order
 };
 
 /// In a folder of its own. One process writes it.
@@ -57,35 +57,41 @@ class TileStore {
   [[nodiscard]] bool is_sorted();
   /// One pass over the scan: every sample into its tile.
   /// Errors: kTooLarge (the disk is full; field "path"), kInvalidArgument (it cannot be written), kCancelled
-  /// Cost:   32 bytes of disk and as much of memory for 2^21 samples
+  /// Cost:   32 bytes of disk a sample, and 36 of memory for 2^22 samples
   Result<void> sort(const MappedFile& file, const ScanRecords& records, const ExecutionContext& context);
 
   [[nodiscard]] std::size_t tile_count() const { return cuts_.tile_count(); }
-  [[nodiscard]] std::uint64_t sample_count(std::size_t tile) const;
+  [[nodiscard]] std::uint64_t sample_count(std::size_t tile) const;  ///< once sorted
 
   /// The tile's samples and those of other tiles within `rings` neighbourhoods of `neighbors` samples around
   /// them; a neighbourhood reaches at least as far as `least_ring`. Errors: kInvalidArgument (cannot be read)
   [[nodiscard]] Result<TileInput> load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
                                        float least_ring, bool has_normals) const;
 
-  [[nodiscard]] bool has_result(std::size_t tile) const;
+  /// Of one step of an animation; a plain job has step 0 alone.
+  [[nodiscard]] bool has_result(std::size_t tile, std::size_t step) const;
   /// On the disk once it returns. Errors: those of write_file_atomically
-  Result<void> put_result(std::size_t tile, const TileResult& result) const;
-  [[nodiscard]] std::string result_path(std::size_t tile) const;
+  Result<void> put_result(std::size_t tile, std::size_t step, const TileResult& result) const;
+  [[nodiscard]] std::string result_path(std::size_t tile, std::size_t step) const;
 
  private:
   struct Extent {
     std::uint64_t first = 0;  // in the spool, in samples
     std::uint64_t count = 0;
   };
-  Result<void> read_samples(std::size_t tile, std::vector<TileSample>& samples) const;
+  [[nodiscard]] std::uint64_t cell_samples(std::size_t cell) const;
+  /// All samples of the cell, to `to`. False: errno says why.
+  bool read_cell(int spool, std::size_t cell, TileSample* to) const;
+  /// The tile's samples, then those of other tiles in the box that `widened` makes of the first ones.
+  Result<std::vector<TileSample>> read_around(
+      std::size_t tile, const std::function<Box3f(std::span<const TileSample>)>& widened) const;
   [[nodiscard]] std::vector<std::byte> index_bytes() const;
   bool read_index();
 
   std::string folder_;
   TileCuts cuts_;
   Vec3d origin_;
-  std::vector<std::vector<Extent>> extents_;  // of each tile
+  std::vector<std::vector<Extent>> extents_;  // of each cell
 };
 
 /// A tile's result as its file has it; views, valid while the bytes are.

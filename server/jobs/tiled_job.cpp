@@ -4,11 +4,18 @@
 #include <sys/statvfs.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <memory>
+#include <mutex>
 #include <numbers>
 #include <optional>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -30,26 +37,40 @@ using protocol::ProblemKind;
 constexpr std::uint64_t kBytesOfSample = 360;
 constexpr std::uint64_t kBytesOfBand = 90;
 /// Of the memory, what preview, buffers and the program itself may take.
-constexpr double kShareOfTiles = 0.6;
+constexpr double kShareOfTiles = 0.8;
+/// Tiles that are edited side by side, whatever the number of threads: their size must not depend on it.
+constexpr std::size_t kTilesAtOnce = 2;
 /// Samples around a tile, by its own: a guess that the share above leaves room for.
 constexpr double kAround = 1.5;
+/// What is read around a tile is whole cells of its neighbours.
+constexpr std::size_t kCellsOfTile = 16;
 constexpr std::uint64_t kCandidates = 5;  // for each sample of the preview
 constexpr std::uint64_t kLeastSurveyed = 200'000;
 constexpr std::uint64_t kWriteChunk = std::uint64_t{1} << 20U;  // samples
+constexpr std::size_t kChunksAtOnce = 2;
 
 /// Neighbourhoods around a sample that its own outcome depends on.
-std::uint32_t rings_of(const EditScript& script) {
-  const auto bands = static_cast<std::uint32_t>(script.bases.bands.size());
-  std::uint32_t rings = 1;
-  for (const TransferredEdit& edit : script.edits) rings += bands - edit.params.level + 1;
-  return rings;
+std::uint32_t rings_of(const PlayedSteps& played) {
+  const auto bands = static_cast<std::uint32_t>(played.script.bases.bands.size());
+  std::uint32_t most = 1;
+  for (const PlayedSteps::Step& step : played.steps) {
+    std::uint32_t rings = 1;
+    for (const TransferredEdit& edit : step.edits) rings += bands - edit.params.level + 1;
+    most = std::max(most, rings);
+  }
+  return most;
 }
 
 class TiledJob {
  public:
   TiledJob(const JobParams& params, const MappedFile& file, const ScanRecords& records,
            const ExecutionContext& context, const JobProgress& progress)
-      : params_(params), file_(file), records_(records), context_(context), progress_(progress) {}
+      : params_(params),
+        file_(file),
+        records_(records),
+        context_(context),
+        progress_(progress),
+        outputs_(outputs_of(params)) {}
 
   Outcome<JobReport> run() {
     report_.samples = records_.count;
@@ -99,9 +120,9 @@ class TiledJob {
     std::uint64_t kept = 0;
     for (const auto& entry : std::filesystem::directory_iterator(params_.folder))
       if (entry.is_regular_file()) kept += entry.file_size();
-    const std::uint64_t all = 2 * sizeof(TileSample) * records_.count;
+    const std::uint64_t all = (1 + outputs_.size()) * sizeof(TileSample) * records_.count;
     const std::uint64_t scratch = all - std::min(all, kept);
-    const std::uint64_t output = file_.bytes().size();
+    const std::uint64_t output = outputs_.size() * file_.bytes().size();
     const std::string beside = std::filesystem::path(params_.output).parent_path().string();
     const Place here = place_of(params_.folder);
     const Place there = place_of(beside.empty() ? "." : beside);
@@ -126,14 +147,15 @@ class TiledJob {
     report_.preview_samples = preview_->size();
     const auto levels = hierarchy_for(params_.request.recipe, *preview_, params_.neighbors);
     if (!levels.ok()) return levels.problem();
-    auto played = play_on_preview(params_.request, preview_, levels.value(), context_);
+    auto played = play_steps_on_preview(params_.request, static_cast<std::uint32_t>(outputs_.size()),
+                                        preview_, levels.value(), context_);
     if (!played.ok()) return played.problem();
     played_ = std::move(played.value());
     EditScript& script = played_.script;
     script.spacing_ratio = static_cast<float>(std::min(
         1.0, std::sqrt(static_cast<double>(preview_->size()) / static_cast<double>(records_.count))));
     report_.spacing = static_cast<double>(script.bases.spacing * script.spacing_ratio);
-    rings_ = rings_of(script);
+    rings_ = rings_of(played_);
     return std::nullopt;
   }
 
@@ -147,18 +169,21 @@ class TiledJob {
       for (const float* column : {points.x(), points.y(), points.z()})
         add(column, points.size() * sizeof(float));
     };
-    const std::array<std::uint64_t, 4> numbers{records_.count, most, params_.neighbors, rings_};
+    const std::array<std::uint64_t, 5> numbers{records_.count, most, params_.neighbors, rings_,
+                                               outputs_.size()};
     add(numbers.data(), sizeof numbers);
     add(&surveyed_.min, sizeof(Vec3d));
     add(&surveyed_.max, sizeof(Vec3d));
     for (const Vec3d& p : surveyed_.position) add(&p, sizeof p);
     for (const Vec3f& n : surveyed_.normal) add(&n, sizeof n);
     add_points(played_.rest);
-    add_points(played_.result);
-    for (const TransferredEdit& edit : played_.script.edits) {
-      const std::array<std::uint64_t, 3> head{edit.params.level, edit.regions.zero.size(),
-                                              edit.regions.one.size()};
-      add(head.data(), sizeof head);
+    for (const PlayedSteps::Step& step : played_.steps) {
+      add_points(step.result);
+      for (const TransferredEdit& edit : step.edits) {
+        const std::array<std::uint64_t, 3> head{edit.params.level, edit.regions->zero.size(),
+                                                edit.regions->one.size()};
+        add(head.data(), sizeof head);
+      }
     }
     return to_hex(hash.finish());
   }
@@ -167,8 +192,8 @@ class TiledJob {
     progress_("tiles", 0.1);
     const std::uint64_t bytes_each = kBytesOfSample + kBytesOfBand * played_.script.bases.bands.size();
     const double room = kShareOfTiles * static_cast<double>(params_.memory_bytes);
-    const auto most =
-        static_cast<std::uint64_t>(std::max(4096.0, room / kAround / static_cast<double>(bytes_each)));
+    const auto most = static_cast<std::uint64_t>(
+        std::max(4096.0, room / kAround / static_cast<double>(kTilesAtOnce * bytes_each)));
     const double share = static_cast<double>(candidates_.size()) / static_cast<double>(records_.count);
     const auto most_candidates = static_cast<std::size_t>(std::max(1.0, share * static_cast<double>(most)));
     // Candidates may stand about another origin than the preview that was given.
@@ -176,7 +201,8 @@ class TiledJob {
     const Vec3d offset = candidates_.origin - played_.script.origin;
     for (std::size_t i = 0; i < candidates.size(); ++i)
       candidates.set(i, (candidates_.position[i].cast<double>() + offset).cast<float>());
-    store_.emplace(params_.folder, TileCuts(candidates, most_candidates), played_.script.origin);
+    store_.emplace(params_.folder, TileCuts(candidates, most_candidates, most_candidates / kCellsOfTile),
+                   played_.script.origin);
     candidates_ = {};
     report_.tiles = store_->tile_count();
 
@@ -202,59 +228,101 @@ class TiledJob {
     // Of an even scan of the typical spacing h: k samples in a disc of radius h sqrt(k / pi).
     const double per_ring = std::sqrt((static_cast<double>(params_.neighbors) + 0.5) / std::numbers::pi);
     const auto least_ring = static_cast<float>(report_.spacing * per_ring);
+    // Two lanes: what one of them reads, sorts and writes on its own, the other one's loops make up for.
+    std::atomic<std::size_t> next{0};
     std::uint64_t done = 0;
-    for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
+    std::optional<Problem> failure;
+    std::mutex mutex;  // guards done, failure, the report and the progress
+    const auto fail = [&](Problem problem) {
+      const std::lock_guard lock(mutex);
+      if (!failure) failure = std::move(problem);
+    };
+    /// Whether the tile is to be edited.
+    const auto begin_tile = [&](std::size_t tile) {
+      const std::lock_guard lock(mutex);
+      if (failure) return false;
       progress_("tile " + std::to_string(tile + 1) + " of " + std::to_string(store_->tile_count()),
                 0.2 + 0.7 * static_cast<double>(done) / static_cast<double>(records_.count));
       done += store_->sample_count(tile);
-      if (store_->has_result(tile)) {
+      // Steps come in their order.
+      if (store_->has_result(tile, outputs_.size() - 1)) {
         ++report_.tiles_kept;
-        continue;
+        return false;
       }
-      if (store_->sample_count(tile) == 0) continue;
-      if (context_.is_cancelled()) return protocol::to_problem(cancelled_error());
-      auto input = store_->load(tile, rings_, params_.neighbors, least_ring, records_.has_normals());
-      if (!input) return protocol::to_problem(input.error());
-      const std::shared_ptr<const Cloud> cloud = input.value().cloud;
-      auto made = transfer_edits(played_.script, anchors, cloud, context_);
+      return store_->sample_count(tile) > 0;
+    };
+    parallel_for(
+        kTilesAtOnce,
+        [&](std::size_t, std::size_t) {
+          for (std::size_t tile = next++; tile < store_->tile_count(); tile = next++) {
+            if (!begin_tile(tile)) continue;
+            if (auto problem = edit_tile(tile, anchors, least_ring)) fail(std::move(*problem));
+          }
+        },
+        1);
+    return failure;
+  }
+
+  [[nodiscard]] std::optional<Problem> edit_tile(std::size_t tile, const AnchorIndex& anchors,
+                                                 float least_ring) const {
+    if (context_.is_cancelled()) return protocol::to_problem(cancelled_error());
+    auto input = store_->load(tile, rings_, params_.neighbors, least_ring, records_.has_normals());
+    if (!input) return protocol::to_problem(input.error());
+    auto rest = decompose_samples(played_.script, anchors, input.value().cloud, context_);
+    if (!rest) return protocol::to_problem(rest.error());
+    for (std::size_t step = 0; step < outputs_.size(); ++step) {
+      const bool is_last = step + 1 == outputs_.size();
+      auto made = make_edits(played_.script, played_.steps[step].edits,
+                             is_last ? std::move(rest).value() : rest.value(), context_);
       if (!made) return protocol::to_problem(made.error());
-      if (auto put = store_->put_result(tile, result_of(input.value(), made.value())); !put)
-        return protocol::to_problem(put.error());
+      const TileResult result = result_of(input.value(), made.value(), played_.steps[step].result);
+      if (auto put = store_->put_result(tile, step, result); !put) return protocol::to_problem(put.error());
     }
     return std::nullopt;
   }
 
-  [[nodiscard]] TileResult result_of(const TileInput& input, const TransferredSamples& made) const {
-    TileResult result;
+  [[nodiscard]] TileResult result_of(const TileInput& input, const TransferredSamples& made,
+                                     const Points& shown) const {
+    struct Fate {
+      TileSample sample;
+      float rest_distance = 0.0F;
+      float difference = 0.0F;
+      bool moved = false;
+    };
     const Level& now = made.surface.finest();
     const Points& before = input.cloud->position;
     const Points& normals = input.cloud->normal;
-    std::vector<PreviewMatch> best;
-    std::vector<std::uint32_t> order;
-    for (std::uint32_t i = 0; i < input.index.size(); ++i)
-      if (input.is_own[i] != 0) order.push_back(i);
-    std::sort(order.begin(), order.end(),
-              [&](std::uint32_t a, std::uint32_t b) { return input.index[a] < input.index[b]; });
-    for (const std::uint32_t i : order) {
-      const Vec3f p = now.position[i];
-      // Normals that are no directions stay as they are where the sample does.
-      const bool moved = p != before[i] || (records_.has_normals() && turned(normals[i], now.normal[i]));
-      if (moved) {
+    std::vector<Fate> fates(input.index.size());
+    parallel_for(fates.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const Vec3f p = now.position[i];
         const Vec3f n = now.normal[i];
-        result.moved.push_back(
-            {.index = input.index[i], .position = {p.x(), p.y(), p.z()}, .normal = {n.x(), n.y(), n.z()}});
+        const std::uint32_t anchor = made.anchor[i];
+        const Vec3f apart = (p - before[i]) - (shown[anchor] - played_.rest[anchor]);
+        fates[i] = {.sample = {.index = input.index[i],
+                               .position = {p.x(), p.y(), p.z()},
+                               .normal = {n.x(), n.y(), n.z()}},
+                    .rest_distance = (before[i] - played_.rest[anchor]).norm(),
+                    .difference = apart.norm(),
+                    // Normals that are no directions stay as they are where the sample does.
+                    .moved = p != before[i] || (records_.has_normals() && turned(normals[i], n))};
       }
-      const std::uint32_t anchor = made.anchor[i];
-      const float rest = (before[i] - played_.rest[anchor]).norm();
-      const Vec3f apart = (p - before[i]) - (played_.result[anchor] - played_.rest[anchor]);
-      best.push_back({.anchor = anchor, .rest_distance = rest, .difference = apart.norm()});
-    }
-    std::stable_sort(best.begin(), best.end(), [](const PreviewMatch& a, const PreviewMatch& b) {
-      return a.anchor != b.anchor ? a.anchor < b.anchor : a.rest_distance < b.rest_distance;
     });
-    for (const PreviewMatch& match : best)
-      if (result.matches.empty() || result.matches.back().anchor != match.anchor)
-        result.matches.push_back(match);
+    TileResult result;
+    std::vector<std::uint32_t> best(played_.rest.size(), kNoParent);
+    // Own samples alone, in the scan's order: of equally near ones the first counts.
+    for (const std::uint32_t i : input.by_index) {
+      const Fate& fate = fates[i];
+      if (fate.moved) result.moved.push_back(fate.sample);
+      std::uint32_t& nearest = best[made.anchor[i]];
+      if (nearest == kNoParent || fate.rest_distance < fates[nearest].rest_distance) nearest = i;
+    }
+    for (std::uint32_t anchor = 0; anchor < best.size(); ++anchor) {
+      if (best[anchor] == kNoParent) continue;
+      const Fate& fate = fates[best[anchor]];
+      result.matches.push_back(
+          {.anchor = anchor, .rest_distance = fate.rest_distance, .difference = fate.difference});
+    }
     return result;
   }
 
@@ -265,77 +333,124 @@ class TiledJob {
     return !(length > 1e-6F) || !std::isfinite(length) ? false : Vec3f(before / length) != after;
   }
 
+  /// A tile's result on the disk.
+  struct MovedSamples {
+    MappedFile file;
+    std::span<const TileSample> samples;  // by index
+  };
+
   std::optional<Problem> write() {
-    progress_("result", 0.9);
-    std::vector<MappedFile> files;
-    std::vector<std::span<const TileSample>> moved;
+    for (std::size_t step = 0; step < outputs_.size(); ++step)
+      if (auto problem = write(step)) return problem;
+    report_.files = outputs_;
+    return std::nullopt;
+  }
+
+  std::optional<Problem> write(std::size_t step) {
+    progress_result(step, 0.0);
+    report_.moved = 0;
+    std::vector<MovedSamples> moved;
     std::vector<PreviewMatch> best(played_.rest.size(), {.rest_distance = std::numeric_limits<float>::max()});
     for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
-      if (!store_->has_result(tile)) continue;
-      auto file = MappedFile::open(store_->result_path(tile));
+      if (!store_->has_result(tile, step)) continue;
+      auto file = MappedFile::open(store_->result_path(tile, step));
       if (!file) return protocol::to_problem(file.error());
-      files.push_back(std::move(file).value());
-      auto view = view_result(files.back().bytes());
+      auto view = view_result(file.value().bytes());
       if (!view) return protocol::to_problem(view.error());
-      moved.push_back(view.value().moved);
       report_.moved += view.value().moved.size();
       for (const PreviewMatch& match : view.value().matches)
         if (match.anchor < best.size() && match.rest_distance < best[match.anchor].rest_distance)
           best[match.anchor] = match;
+      moved.push_back({.file = std::move(file).value(), .samples = view.value().moved});
     }
-    DifferenceSum differences;
+    DifferenceSum differences;  // the last step's stay
     for (const PreviewMatch& match : best)
       if (static_cast<double>(match.rest_distance) <= report_.spacing)
         differences.add(static_cast<double>(match.difference));
     differences.report(report_);
 
     const auto written =
-        fill_file_atomically(params_.output, [&](int out) { return write_records(out, moved); });
+        fill_file_atomically(outputs_[step], [&](int out) { return write_records(step, out, moved); });
     if (!written) return protocol::to_problem(written.error());
     return std::nullopt;
   }
 
+  void progress_result(std::size_t step, double part) const {
+    progress_("result",
+              0.9 + 0.1 * (static_cast<double>(step) + part) / static_cast<double>(outputs_.size()));
+  }
+
   /// False: errno says why.
-  Result<bool> write_records(int out, std::vector<std::span<const TileSample>>& moved) {
+  Result<bool> write_records(std::size_t step, int out, const std::vector<MovedSamples>& moved) {
     const std::span<const std::byte> bytes = file_.bytes();
-    if (!write_all(out, bytes.first(static_cast<std::size_t>(records_.begin)))) return false;
-    std::vector<std::byte> chunk;
-    std::vector<std::uint8_t> unsaid(moved.size());
-    for (std::uint64_t begin = 0; begin < records_.count; begin += kWriteChunk) {
-      if (context_.is_cancelled()) return cancelled_error();
-      progress_("result", 0.9 + 0.1 * static_cast<double>(begin) / static_cast<double>(records_.count));
-      const std::uint64_t end = std::min(records_.count, begin + kWriteChunk);
-      const std::uint64_t from = records_.begin + begin * records_.record_bytes;
-      const std::uint64_t to = records_.begin + end * records_.record_bytes;
-      chunk.assign(bytes.begin() + static_cast<std::ptrdiff_t>(from),
-                   bytes.begin() + static_cast<std::ptrdiff_t>(to));
-      // Tiles share no sample, so they can be put in side by side.
-      parallel_for(
-          moved.size(),
-          [&](std::size_t first, std::size_t last) {
-            for (std::size_t tile = first; tile < last; ++tile) {
-              std::span<const TileSample>& left = moved[tile];
-              for (; !left.empty() && left.front().index < end; left = left.subspan(1))
-                unsaid[tile] |= static_cast<std::uint8_t>(!replace(left.front(), chunk.data(), begin));
-            }
-          },
-          1);
-      if (std::ranges::find(unsaid, std::uint8_t{1}) != unsaid.end())
-        return Error{.code = ErrorCode::kInvalidArgument,
-                     .message =
-                         "the edits take samples to where the file's whole numbers cannot say them: the "
-                         "mode memory chooses a grid that can, and so does PLY",
-                     .field = "deformation"};
-      if (!write_all(out, chunk)) return false;
-      file_.release(from, to);
+    if (!write_all_at(out, bytes.first(static_cast<std::size_t>(records_.begin)), 0)) return false;
+    // Every chunk has its place in the file, so they may be made and written side by side.
+    const std::uint64_t chunks = (records_.count + kWriteChunk - 1) / kWriteChunk;
+    std::atomic<std::uint64_t> next{0};
+    std::atomic<bool> unsaid{false};
+    std::atomic<int> failure{0};  // errno
+    std::mutex mutex;             // guards the progress
+    std::uint64_t done = 0;
+    const auto write_chunks = [&] {
+      std::vector<std::byte> chunk;
+      for (std::uint64_t k = next++; k < chunks; k = next++) {
+        if (context_.is_cancelled() || failure != 0 || unsaid) return;
+        const std::uint64_t begin = k * kWriteChunk;
+        const std::uint64_t end = std::min(records_.count, begin + kWriteChunk);
+        const std::uint64_t from = records_.begin + begin * records_.record_bytes;
+        const std::uint64_t to = records_.begin + end * records_.record_bytes;
+        chunk.assign(bytes.begin() + static_cast<std::ptrdiff_t>(from),
+                     bytes.begin() + static_cast<std::ptrdiff_t>(to));
+        // Tiles share no sample, so they can be put in side by side.
+        parallel_for(
+            moved.size(),
+            [&](std::size_t first, std::size_t last) {
+              for (std::size_t tile = first; tile < last; ++tile)
+                if (!replace(moved[tile], begin, end, chunk.data())) unsaid = true;
+            },
+            1);
+        if (unsaid) return;
+        if (!write_all_at(out, chunk, from)) failure = errno;
+        file_.release(from, to);
+        const std::lock_guard lock(mutex);
+        progress_result(step, static_cast<double>(++done) / static_cast<double>(chunks + 1));
+      }
+    };
+    parallel_for(
+        kChunksAtOnce, [&](std::size_t, std::size_t) { write_chunks(); }, 1);
+    if (context_.is_cancelled()) return cancelled_error();
+    if (unsaid)
+      return Error{.code = ErrorCode::kInvalidArgument,
+                   .message =
+                       "the edits take samples to where the file's whole numbers cannot say them: the "
+                       "mode memory chooses a grid that can, and so does PLY",
+                   .field = "deformation"};
+    if (failure == 0 &&
+        write_all_at(out, bytes.subspan(static_cast<std::size_t>(records_.end())), records_.end()))
+      return true;
+    if (failure != 0) errno = failure;
+    return false;
+  }
+
+  /// Puts the tile's samples begin .. end - 1 into the chunk. False: a record cannot say the place.
+  bool replace(const MovedSamples& moved, std::uint64_t begin, std::uint64_t end, std::byte* chunk) const {
+    const auto first = std::ranges::lower_bound(moved.samples, begin, {}, &TileSample::index);
+    const auto last = std::ranges::lower_bound(first, moved.samples.end(), end, {}, &TileSample::index);
+    bool can = true;
+    for (auto sample = first; sample != last; ++sample) {
+      if (sample->index < begin || sample->index >= end) return false;  // a damaged result
+      can = replace(*sample, chunk + (sample->index - begin) * records_.record_bytes) && can;
     }
-    return write_all(out, bytes.subspan(static_cast<std::size_t>(records_.end())));
+    const auto byte_of = [&](auto at) {
+      return static_cast<std::uint64_t>(reinterpret_cast<const std::byte*>(std::to_address(at)) -
+                                        moved.file.bytes().data());
+    };
+    moved.file.release(byte_of(first), byte_of(last));
+    return can;
   }
 
   /// False: the record cannot say the place.
-  bool replace(const TileSample& sample, std::byte* chunk, std::uint64_t begin) const {
-    if (sample.index < begin) return false;  // a damaged result
-    std::byte* const record = chunk + (sample.index - begin) * records_.record_bytes;
+  bool replace(const TileSample& sample, std::byte* record) const {
     const Vec3f p(sample.position[0], sample.position[1], sample.position[2]);
     const Vec3d place = played_.script.origin + p.cast<double>();
     if (!records_.can_say(place)) return false;
@@ -354,7 +469,8 @@ class TiledJob {
   ScanSurvey surveyed_;
   Cloud candidates_;
   std::shared_ptr<const Cloud> preview_;
-  PlayedRecipe played_;
+  const std::vector<std::string> outputs_;  // one for each step
+  PlayedSteps played_;
   std::uint32_t rings_ = 1;
   std::optional<TileStore> store_;
 };

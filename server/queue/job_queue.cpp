@@ -59,10 +59,9 @@ std::string text_of(const std::vector<std::string>& words) {
   return text;
 }
 
-Outcome<protocol::JobResult> result_of(const std::string& path, const std::string& name,
+Outcome<protocol::JobResult> result_of(const std::string& folder, const std::string& name,
                                        const protocol::JobTerms& terms) {
-  const Problem failure{.kind = ProblemKind::kInternalError,
-                        .detail = "the worker says that it is done, but its result cannot be read"};
+  const std::string path = folder + "/" + name;
   std::error_code none;
   const std::uint64_t bytes = std::filesystem::file_size(path, none);
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
@@ -72,12 +71,29 @@ Outcome<protocol::JobResult> result_of(const std::string& path, const std::strin
         digest.add(piece);
         return true;
       });
-  if (!is_read) return failure;
+  if (!is_read)
+    return Problem{.kind = ProblemKind::kInternalError,
+                   .detail = "the worker says that it is done, but its result cannot be read"};
   return protocol::JobResult{
       .name = name,
       .media_type = std::string(file_type(terms.format.value_or(CloudFormat::kPly)).media_type),
       .bytes = bytes,
       .sha256 = to_hex(digest.finish())};
+}
+
+/// The files of a worker's report, which then no longer says where they are.
+Outcome<std::vector<protocol::JobResult>> results_of(const std::string& folder, JsonDocument& report,
+                                                     const protocol::JobTerms& terms) {
+  std::vector<protocol::JobResult> results;
+  const JsonDocument files = report.value("files", JsonDocument::array());
+  report.erase("files");
+  for (const JsonDocument& file : files) {
+    const std::string name = std::filesystem::path(file.get<std::string>()).filename().string();
+    auto result = result_of(folder, name, terms);
+    if (!result.ok()) return result.problem();
+    results.push_back(std::move(result.value()));
+  }
+  return results;
 }
 
 }  // namespace
@@ -523,15 +539,15 @@ void JobQueue::settle(const SharedEntry& entry, const ChildEnd& end, const std::
     job = entry->kept;
   }
   const std::string& id = job.document.id;
-  const WorkerWord word = parse_worker_word(last);
+  WorkerWord word = parse_worker_word(last);
   std::optional<Problem> problem;
   std::vector<protocol::JobResult> results;
   if (word.report && end.signal == 0 && end.status == 0) {
-    auto result = result_of(result_path(id, job.result), job.result, job.document.terms);
-    if (result.ok())
-      results.push_back(std::move(result.value()));
+    auto made = results_of(folder_of(id), *word.report, job.document.terms);
+    if (made.ok())
+      results = std::move(made.value());
     else
-      problem = result.problem();
+      problem = made.problem();
   } else {
     problem = problem_of_worker(end, word);
   }

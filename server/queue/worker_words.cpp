@@ -32,6 +32,7 @@ std::vector<std::string> worker_words(const std::string& program, const KeptJob&
   else
     add("--preview", files.preview);
   if (!terms.mode.empty()) add("--mode", terms.mode);
+  if (terms.steps > 0) add("--steps", std::to_string(terms.steps));
   if (threads > 0) add("--threads", std::to_string(threads));
   if (job.drop_non_finite) words.emplace_back("--drop-non-finite");
   return words;

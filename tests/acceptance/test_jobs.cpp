@@ -198,6 +198,20 @@ TEST_CASE("a recipe is made on an upload as it came, with a preview of its own o
   CHECK(daemon.ask("HEAD", "/v1/uploads/" + upload, "", "Tus-Resumable: 1.0.0\r\n").status == 200);
 }
 
+TEST_CASE("an animation is one job with many results") {
+  Daemon daemon;
+  const Lifted lifted(daemon);
+  const json job = done(daemon, submit(daemon, {{"session", lifted.session}, {"output", {{"steps", 3}}}}));
+  CHECK(job["request"]["output"] == json{{"format", "ply"}, {"steps", 3}});
+  CHECK_FALSE(job["report"].contains("files"));
+  const json results = daemon.get(path_of(job) + "/results").json()["results"];
+  REQUIRE(results.size() == 3);
+  CHECK(results[2]["name"] == "result_0003.ply");
+  CHECK(daemon.get(results[0]["href"]).body == lifted.file);  // s = 0
+  const json plain = done(daemon, submit(daemon, {{"session", lifted.session}}));
+  CHECK(daemon.get(results[2]["href"]).body == daemon.get(path_of(plain) + "/results/result.ply").body);
+}
+
 TEST_CASE("jobs go by priority; one that is dismissed ends at once, and goes on when it is started again") {
   const TemporaryFolder folder;
   const Held held;

@@ -1,6 +1,10 @@
 #pragma once
 // Every area's benchmarks; main.cpp runs them all.
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "tests/bench/bench.h"
 
 namespace pointwright::bench {
@@ -16,5 +20,10 @@ void bench_undo(BenchReport& report);
 void bench_resampling(BenchReport& report);
 /// Only where the daemon is built.
 void bench_http(BenchReport& report);
+/// Likewise.
+void bench_jobs(BenchReport& report);
+/// Jobs on scans of these sizes, ascending, made and removed below `folder`: time and memory by size. Likewise.
+void bench_job_growth(BenchReport& report, const std::vector<std::uint64_t>& sizes,
+                      const std::string& folder);
 
 }  // namespace pointwright::bench

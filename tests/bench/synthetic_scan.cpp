@@ -1,6 +1,9 @@
 #include "tests/bench/synthetic_scan.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <fstream>
 #include <numbers>
 #include <numeric>
 
@@ -27,6 +30,17 @@ class Random {
 
 constexpr double kMinor = 0.4;
 
+// Even by area.
+Vec3f next_sample(Random& random) {
+  constexpr double kTwoPi = 2.0 * std::numbers::pi;
+  while (true) {
+    const double u = kTwoPi * random.uniform();
+    const double v = kTwoPi * random.uniform();
+    if (random.uniform() * (1.0 + kMinor) <= 1.0 + kMinor * std::cos(v))
+      return scan_surface(u, v).cast<float>();
+  }
+}
+
 }  // namespace
 
 Vec3d scan_surface(double u, double v) {
@@ -38,19 +52,33 @@ Vec3d scan_surface(double u, double v) {
 }
 
 Cloud synthetic_scan(std::size_t n, std::uint64_t seed) {
-  constexpr double kTwoPi = 2.0 * std::numbers::pi;
   Cloud cloud;
   cloud.position.resize(n);
   cloud.id.resize(n);
   std::iota(cloud.id.begin(), cloud.id.end(), 0U);
   Random random(seed);
-  for (std::size_t i = 0; i < n;) {
-    const double u = kTwoPi * random.uniform();
-    const double v = kTwoPi * random.uniform();
-    if (random.uniform() * (1.0 + kMinor) > 1.0 + kMinor * std::cos(v)) continue;  // even by area
-    cloud.position.set(i++, scan_surface(u, v).cast<float>());
-  }
+  for (std::size_t i = 0; i < n; ++i) cloud.position.set(i, next_sample(random));
   return cloud;
+}
+
+bool write_synthetic_scan(const std::string& path, std::uint64_t n, std::uint64_t seed) {
+  static_assert(std::endian::native == std::endian::little);
+  constexpr std::uint64_t kPiece = 1U << 16U;
+  std::ofstream out(path, std::ios::binary);
+  out << "ply\nformat binary_little_endian 1.0\nelement vertex " << n
+      << "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+  Random random(seed);
+  std::vector<float> piece;
+  for (std::uint64_t done = 0; done < n; done += kPiece) {
+    piece.clear();
+    for (std::uint64_t i = done; i < std::min(n, done + kPiece); ++i) {
+      const Vec3f p = next_sample(random);
+      piece.insert(piece.end(), {p.x(), p.y(), p.z()});
+    }
+    out.write(reinterpret_cast<const char*>(piece.data()),
+              static_cast<std::streamsize>(piece.size() * sizeof(float)));
+  }
+  return static_cast<bool>(out.flush());
 }
 
 Cloud ordered_scan(std::size_t n) {

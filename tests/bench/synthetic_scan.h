@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "engine/core/cloud.h"
@@ -18,6 +19,10 @@ Vec3d scan_surface(double u, double v);
 /// Pre:  n <= 2^32 - 1
 /// Cost: O(N)
 Cloud synthetic_scan(std::size_t n, std::uint64_t seed = 1);
+
+/// The same samples, bit for bit, as a binary PLY of positions, piece by piece, however many. Returns whether
+/// it could be written.
+[[nodiscard]] bool write_synthetic_scan(const std::string& path, std::uint64_t n, std::uint64_t seed = 1);
 
 /// Scales of the three bands that sessions and frames are measured with.
 inline const std::vector<float> kThreeScales{0.04F, 0.02F, 0.01F};

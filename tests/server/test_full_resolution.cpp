@@ -296,6 +296,78 @@ TEST_CASE("tiles of another recipe or another input are not taken for this job's
   CHECK(job.run(other).tiles_kept == 0);
 }
 
+TEST_CASE("an animation's clouds are those of plain jobs, the first one the input to the bit") {
+  const JobFolder job;
+  put(job.in, odd_ply(120));
+  JobParams params = job.params();
+  for (const protocol::Timing timing : {protocol::Timing::kSequence, protocol::Timing::kTogether}) {
+    params.request.timing = timing;
+    params.steps = 5;
+    params.output = job.out;
+    const JobReport report = job.run(params);
+    CHECK(report.tiles > 2);
+    CHECK(report.moved > 5000);
+    REQUIRE(report.files.size() == 5);
+    CHECK(report.files == outputs_of(params));
+    CHECK(report.files[1] == job.folder / "out_0002.ply");
+    CHECK_FALSE(std::filesystem::exists(job.out));
+    CHECK(bytes_of(report.files[0]) == bytes_of(job.in));
+    params.steps = std::nullopt;
+    for (std::size_t k = 1; k < 5; ++k) {
+      params.request.s = static_cast<double>(k) / 4.0;
+      params.output = job.folder / "plain.ply";
+      CHECK(job.run(params).files == std::vector<std::string>{params.output});
+      CHECK(bytes_of(report.files[k]) == bytes_of(params.output));
+    }
+  }
+}
+
+TEST_CASE(
+    "an animation in memory, with samples that are inserted, begins with the input and ends as a plain job") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(100));
+  JobParams params = job.params(1);
+  params.request.recipe.edits[0].edit.deformation.steps = {Translation{.vector = {1.0, 0.0, 0.0}}};
+  params.request.recipe.edits[0].edit.resampling = ResamplingParams{};
+  job.run(params);
+  const std::string plain = bytes_of(job.out);
+  params.steps = 3;
+  const JobReport report = job.run(params);
+  CHECK(report.mode == JobMode::kMemory);
+  CHECK(report.inserted > 2000);
+  REQUIRE(report.files.size() == 3);
+  CHECK(cloud_of(report.files[0]).position == cloud_of(job.in).position);
+  CHECK(cloud_of(report.files[1]).size() > 10'000);
+  CHECK(bytes_of(report.files[2]) == plain);
+}
+
+TEST_CASE(
+    "an animation that was interrupted goes on from its tiles, not from those of another number of steps") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(150));
+  JobParams params = job.params();
+  params.steps = 3;
+  std::vector<std::string> undisturbed;
+  for (const std::string& file : job.run(params).files) {
+    undisturbed.push_back(bytes_of(file));
+    std::filesystem::remove(file);
+  }
+  const auto interrupt = [&] {
+    const ExecutionContext context;
+    const auto report = run_full_resolution(params, context, [&](const std::string& phase, double) {
+      if (phase == "result") context.cancel();
+    });
+    REQUIRE_FALSE(report.ok());
+  };
+  interrupt();
+  const JobReport report = job.run(params);
+  CHECK(report.tiles_kept == report.tiles);
+  for (std::size_t k = 0; k < 3; ++k) CHECK(bytes_of(report.files[k]) == undisturbed[k]);
+  interrupt();
+  params.steps = 4;
+  CHECK(job.run(params).tiles_kept == 0);
+}
+
 TEST_CASE("LAS stays on its grid, and what its numbers cannot say is refused") {
   const JobFolder job;
   JobParams params = job.params();
@@ -380,6 +452,14 @@ TEST_CASE("jobs refuse what they cannot do, and leave nothing behind") {
   params = job.params();
   params.request.recipe.edits[1].edit.level = 9;
   CHECK(job.refused(params).detail.find("edit 2") != std::string::npos);
+  for (const std::uint32_t steps : {0U, 1U, kMaxJobSteps + 1}) {
+    params = job.params();
+    params.steps = steps;
+    CHECK(job.refused(params).detail == "steps must lie between 2 and 1000");
+  }
+  params.steps = 2;
+  params.mode = JobMode::kDirect;
+  CHECK(job.refused(params).detail.find("direct") != std::string::npos);
   params = job.params();
   params.output = params.input;
   CHECK_FALSE(run_full_resolution(params, ExecutionContext(), [](const std::string&, double) {}).ok());

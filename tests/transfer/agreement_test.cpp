@@ -19,7 +19,7 @@ Agreement agreement(const Cloud& cloud, std::uint64_t preview_samples, const Hie
   Cloud oriented = cloud;
   if (!cloud.has_normals()) oriented.normal = played(cloud, params, {}, paint).rest.finest().normal;
   const PlayedPreview preview = played(preview_of(oriented, preview_samples), params, {edit}, paint);
-  const RegionPair& regions = preview.script.edits.front().regions;
+  const RegionPair& regions = *preview.script.edits.front().regions;
   const PlayedPreview direct = played(oriented, params, {edit}, paint, &regions);
   EditParams single_edit = edit;
   single_edit.level = static_cast<std::uint32_t>(params.scales.size());

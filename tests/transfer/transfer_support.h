@@ -76,7 +76,7 @@ inline PlayedPreview played(const Cloud& cloud, const HierarchyParams& params,
         preview.surface.levels[k] = derived.value().surface.levels[k];
         preview.surface.detail[k] = derived.value().surface.detail[k];
       }
-      transferred.derived = bases_of(derived.value());
+      transferred.derived = std::make_shared<const LevelBases>(bases_of(derived.value()));
       valid = 0;
     }
     const Points& position = preview.surface.levels[edit.level].position;
@@ -98,7 +98,7 @@ inline PlayedPreview played(const Cloud& cloud, const HierarchyParams& params,
     } else {
       preview.surface = apply_edit(preview.surface, *preview.sampling->graph, edit, field, cloud.origin);
     }
-    transferred.regions = std::move(regions).value();
+    transferred.regions = std::make_shared<const RegionPair>(std::move(regions).value());
     preview.script.edits.push_back(std::move(transferred));
     valid = std::max(valid, edit.level);
   }

@@ -59,7 +59,7 @@ TEST_CASE("inserted samples stay with their parents' anchors where levels are de
   REQUIRE(derived.ok());
   TransferredEdit next = preview.script.edits.front();
   next.params = edit_by(Translation{Vec3d(0.0, 0.0, 0.0)});
-  next.derived = bases_of(derived.value());
+  next.derived = std::make_shared<const LevelBases>(bases_of(derived.value()));
   preview.script.edits.push_back(next);
   const Transferred made = transferred(preview.script, cloud);
   REQUIRE(made.sampling->size() > cloud.size() + 500);

@@ -80,6 +80,7 @@ struct Wanted {
   std::string preview_cloud;
   std::string mode;
   std::optional<std::uint64_t> priority;
+  std::optional<std::uint64_t> steps;
   UploadOptions upload;
   std::optional<int> neighbors;
   std::optional<std::uint64_t> preview;
@@ -150,7 +151,8 @@ json job_body(const Wanted& wanted) {
   if (!wanted.session.empty()) body["session"] = wanted.session;
   if (!wanted.preview_cloud.empty()) body["preview"] = {{"cloud", wanted.preview_cloud}};
   if (wanted.preview) body["preview"]["count"] = *wanted.preview;
-  if (!wanted.format.empty()) body["output"] = {{"format", wanted.format}};
+  if (!wanted.format.empty()) body["output"]["format"] = wanted.format;
+  if (wanted.steps) body["output"]["steps"] = *wanted.steps;
   if (!wanted.mode.empty()) body["mode"] = wanted.mode;
   if (!wanted.launcher.empty()) body["launcher"] = wanted.launcher;
   if (!wanted.name.empty()) body["name"] = wanted.name;
@@ -297,6 +299,7 @@ void add_job_commands(CLI::App& app, RemoteCommands& commands) {
   submit->add_option("--preview-count", wanted->preview, "or how many samples of the scan stand in for it");
   submit->add_option("--format", wanted->format,
                      "of the result: ply, las, draco or xyz; else that of the scan");
+  submit->add_option("--steps", wanted->steps, "an animation of so many clouds, from s = 0 on");
   submit->add_option("--mode", wanted->mode, "tiles, memory or direct; else tiles where that can be");
   submit->add_option("--priority", wanted->priority, "0 to 9; higher ones go first");
   submit->add_option("--name", wanted->name, "of the job and its result");

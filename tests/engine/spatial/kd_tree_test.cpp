@@ -48,6 +48,17 @@ bool same(const std::vector<Neighbor>& found, const std::vector<Neighbor>& expec
   return true;
 }
 
+TEST_CASE("the nearest one is the same from wherever the search starts, ties included") {
+  const Points points = lattice(6);
+  const KdTree tree(points);
+  std::vector<Neighbor> found;
+  for (const Vec3f& query : {Vec3f(2.5F, 2.5F, 2.5F), Vec3f(0.1F, 4.9F, 3.0F), Vec3f(-7.0F, 2.0F, 2.5F)}) {
+    tree.nearest(query, 1, found);
+    for (std::uint32_t start = 0; start < points.size(); ++start)
+      CHECK(tree.nearest_from(query, start) == found.front().index);
+  }
+}
+
 TEST_CASE("the nearest points are those that brute force finds") {
   const Points points = coherent_random_points(3000, 1);
   const KdTree tree(points);

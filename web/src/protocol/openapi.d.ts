@@ -1257,6 +1257,8 @@ export interface components {
              * @enum {string}
              */
             format?: "ply" | "las" | "draco" | "xyz";
+            /** @description An animation, so many clouds from s = 0 up to s; the scan is decomposed once */
+            steps?: number;
         };
         /** @description What the recipe is played on */
         JobPreview: {
@@ -1368,6 +1370,8 @@ export interface components {
             };
             spacing: number;
             seconds: number;
+            /** @description Of the worker */
+            peak_memory_bytes?: components["schemas"]["Count"];
         };
         /** @description statusInfo of OGC API - Processes, with more */
         Job: {

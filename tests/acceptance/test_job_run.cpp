@@ -1,0 +1,119 @@
+// `pointwright job run` as a process that may die at any moment.
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "engine/io/cloud_io.h"
+#include "tests/acceptance/daemon.h"
+
+using namespace pointwright;
+using namespace pointwright::test;
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+constexpr const char* kRecipe = R"({"format":"pointwright-recipe","version":1,"level_scales":[0.11,0.05,0],
+"edits":[{"zero":{"operations":[{"mode":"add","shape":{"type":"box","min":[-1,-1,-1],"max":[0.3,2,1]}}]},
+"one":{"operations":[{"mode":"add","shape":{"type":"box","min":[0.7,-1,-1],"max":[2,2,1]}}]},
+"level":0,"blend":"quartic","deformation":{"type":"translation","vector":[0,0.05,0.3]}},
+{"level":1,"blend":"quartic","deformation":{"type":"rotation","axis":{"point":[0.7,0.5,0.3],
+"direction":[0,1,0]},"angle_deg":25}}]})";
+
+std::string bytes_of(const std::string& path) {
+  std::ostringstream bytes;
+  bytes << std::ifstream(path, std::ios::binary).rdbuf();
+  return bytes.str();
+}
+
+void put_sheet(const std::string& path, std::size_t side) {
+  Cloud cloud;
+  cloud.position.resize(side * side);
+  cloud.id.resize(side * side);
+  for (std::size_t i = 0; i < side * side; ++i) {
+    const float x = static_cast<float>(i % side) / static_cast<float>(side - 1);
+    const float y = static_cast<float>(i / side) / static_cast<float>(side - 1);
+    cloud.position.set(i, {x, y, 0.02F * std::sin(40.0F * x) * std::cos(30.0F * y)});
+    cloud.id[i] = static_cast<std::uint32_t>(i);
+  }
+  const auto bytes = write_cloud(cloud, CloudFormat::kPly, {});
+  REQUIRE(bytes.ok());
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.value().data()),
+             static_cast<std::streamsize>(bytes.value().size()));
+}
+
+/// Starts the command with its output thrown away.
+pid_t start(std::vector<std::string> command) {
+  std::vector<char*> arguments;
+  for (std::string& argument : command) arguments.push_back(argument.data());
+  arguments.push_back(nullptr);
+  const pid_t child = ::fork();
+  REQUIRE(child >= 0);
+  if (child > 0) return child;
+  const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+  ::dup2(nowhere, 1);
+  ::dup2(nowhere, 2);
+  ::execv(arguments[0], arguments.data());
+  ::_exit(127);
+}
+
+}  // namespace
+
+TEST_CASE("a job that is killed at any moments and started again gives the bytes of one that was not") {
+  const TemporaryFolder folder;
+  const std::string in = folder / "in.ply";
+  const std::string out = folder / "out.ply";
+  put_sheet(in, 300);
+  std::ofstream(folder / "recipe.json") << kRecipe;
+  const auto command = [&](const std::string& output) {
+    return std::vector<std::string>{
+        POINTWRIGHT_PATH, "job",  "run",      "--recipe", folder / "recipe.json", "--in", in,
+        "--out",          output, "--memory", "64",       "--preview-count",      "2500", "--json"};
+  };
+  const auto begin = Clock::now();
+  const Ended undisturbed = run(command(folder / "undisturbed.ply"));
+  const auto whole = Clock::now() - begin;
+  REQUIRE_MESSAGE(undisturbed.status == 0, undisturbed.err);
+  CHECK(nlohmann::json::parse(undisturbed.out).at("tiles").get<int>() >= 4);
+  const std::string expected = bytes_of(folder / "undisturbed.ply");
+
+  constexpr unsigned kSeed = 20;
+  constexpr int kKills = 20;
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<double> part(0.0, 1.0);
+  int killed = 0;
+  int ended = 0;
+  while (killed < kKills && ended < kKills) {
+    const pid_t child = start(command(out));
+    std::this_thread::sleep_for(part(random) * whole);
+    ::kill(child, SIGKILL);
+    int status = 0;
+    REQUIRE(::waitpid(child, &status, 0) == child);
+    if (WIFSIGNALED(status)) {
+      ++killed;
+      // The result has its name once it is whole.
+      if (std::filesystem::exists(out)) CHECK(bytes_of(out) == expected);
+      continue;
+    }
+    REQUIRE(WEXITSTATUS(status) == 0);
+    CHECK(bytes_of(out) == expected);
+    std::filesystem::remove(out);  // and from the beginning
+    ++ended;
+  }
+  const Ended last = run(command(out));
+  REQUIRE_MESSAGE(last.status == 0, last.err);
+  CHECK(bytes_of(out) == expected);
+  CHECK_FALSE(std::filesystem::exists(out + ".job"));
+}
