@@ -273,7 +273,7 @@ class TiledJob {
     for (std::size_t step = 0; step < outputs_.size(); ++step) {
       const bool is_last = step + 1 == outputs_.size();
       auto made = make_edits(played_.script, played_.steps[step].edits,
-                             is_last ? std::move(rest).value() : rest.value(), context_);
+                             is_last ? std::exchange(rest.value(), {}) : rest.value(), context_);
       if (!made) return protocol::to_problem(made.error());
       const TileResult result = result_of(input.value(), made.value(), played_.steps[step].result);
       if (auto put = store_->put_result(tile, step, result); !put) return protocol::to_problem(put.error());
@@ -361,6 +361,7 @@ class TiledJob {
       for (const PreviewMatch& match : view.value().matches)
         if (match.anchor < best.size() && match.rest_distance < best[match.anchor].rest_distance)
           best[match.anchor] = match;
+      file.value().release(0, file.value().bytes().size());
       moved.push_back({.file = std::move(file).value(), .samples = view.value().moved});
     }
     DifferenceSum differences;  // the last step's stay
@@ -445,7 +446,9 @@ class TiledJob {
       return static_cast<std::uint64_t>(reinterpret_cast<const std::byte*>(std::to_address(at)) -
                                         moved.file.bytes().data());
     };
-    moved.file.release(byte_of(first), byte_of(last));
+    // Whoever reads a page brings in those around it, too: some of those behind have come back.
+    constexpr std::uint64_t kBroughtBack = std::uint64_t{1} << 18U;
+    moved.file.release(byte_of(first) - std::min(byte_of(first), kBroughtBack), byte_of(last));
     return can;
   }
 
