@@ -442,13 +442,8 @@ class TiledJob {
       if (sample->index < begin || sample->index >= end) return false;  // a damaged result
       can = replace(*sample, chunk + (sample->index - begin) * records_.record_bytes) && can;
     }
-    const auto byte_of = [&](auto at) {
-      return static_cast<std::uint64_t>(reinterpret_cast<const std::byte*>(std::to_address(at)) -
-                                        moved.file.bytes().data());
-    };
-    // Whoever reads a page brings in those around it, too: some of those behind have come back.
-    constexpr std::uint64_t kBroughtBack = std::uint64_t{1} << 18U;
-    moved.file.release(byte_of(first) - std::min(byte_of(first), kBroughtBack), byte_of(last));
+    // All of it: the search above has read pages here and there, too.
+    moved.file.release(0, moved.file.bytes().size());
     return can;
   }
 
