@@ -73,8 +73,8 @@ Result<TransferredSamples> transfer_edits(const EditScript& script, const Anchor
                                           std::shared_ptr<const Cloud> cloud, const ExecutionContext& context,
                                           MultiresSurface* rest = nullptr);
 
-/// The two halves of it: samples before the first edit, which any number of scripts with the same bases can go
-/// on from; and the edits on them, which may be other ones than script.edits.
+/// The two halves of it: samples before the first edit, from which any edits on the same bases can go on; and
+/// the edits on them, which may be other ones than script.edits.
 Result<TransferredSamples> decompose_samples(const EditScript& script, const AnchorIndex& anchors,
                                              std::shared_ptr<const Cloud> cloud,
                                              const ExecutionContext& context);

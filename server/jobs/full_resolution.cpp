@@ -115,7 +115,7 @@ class MemoryJob {
       progress_("edits", 0.3 + 0.7 * static_cast<double>(k) / static_cast<double>(outputs.size()));
       const bool is_last = k + 1 == outputs.size();
       auto made = make_edits(played.script, played.steps[k].edits,
-                             is_last ? std::move(rest).value() : rest.value(), context_);
+                             is_last ? std::exchange(rest.value(), {}) : rest.value(), context_);
       if (!made) return made.error();
       const Edited edited{.sampling = std::move(made.value().sampling),
                           .finest = std::move(made.value().surface.levels.back())};

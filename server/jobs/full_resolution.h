@@ -81,10 +81,10 @@ Outcome<JobEstimate> estimate_full_resolution(const JobParams& params, const Exe
 /// Where a job stands; called between phases and tiles.
 using JobProgress = std::function<void(const std::string& phase, double fraction)>;
 
-/// Runs the job to its end. The output appears whole or not at all, an animation's clouds one after the other
-/// once all of them are made. An animation decomposes the scan once; its last cloud is the plain job's. In tiles a job that was interrupted
-/// goes on where it was, where its folder, its input and its recipe are the same; the folder is removed in
-/// the end.
+/// Runs the job to its end. The output appears whole or not at all, each of an animation's clouds likewise.
+/// An animation decomposes the scan once; its last cloud is the plain job's. In tiles a job that was
+/// interrupted goes on where it was, where its folder, its input and its recipe are the same; the folder is
+/// removed in the end.
 /// Problems:    those of reading the input, of play_on_preview and of writing; kCancelled
 /// Promises:    samples that no edit moved keep their bytes; a recipe without effect gives the input's bytes
 /// Cost:        two passes over the input, 32 bytes of disk a sample and, for each cloud that is written, as

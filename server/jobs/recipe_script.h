@@ -48,8 +48,8 @@ struct PlayedSteps {
   std::vector<Step> steps;
 };
 
-/// Step k of count is the recipe at s = request.s k / (count - 1), as play_on_preview makes it; a single one is
-/// request.s itself. What steps have in common is kept once.
+/// Step k of count is the recipe at s = request.s k / (count - 1), as play_on_preview makes it; a single one
+/// is request.s itself. What steps have in common is kept once.
 Outcome<PlayedSteps> play_steps_on_preview(const protocol::RecipeRequest& request, std::uint32_t count,
                                            std::shared_ptr<const Cloud> preview,
                                            const HierarchyParams& params, const ExecutionContext& context);

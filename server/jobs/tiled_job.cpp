@@ -273,7 +273,7 @@ class TiledJob {
     for (std::size_t step = 0; step < outputs_.size(); ++step) {
       const bool is_last = step + 1 == outputs_.size();
       auto made = make_edits(played_.script, played_.steps[step].edits,
-                             is_last ? std::move(rest).value() : rest.value(), context_);
+                             is_last ? std::exchange(rest.value(), {}) : rest.value(), context_);
       if (!made) return protocol::to_problem(made.error());
       const TileResult result = result_of(input.value(), made.value(), played_.steps[step].result);
       if (auto put = store_->put_result(tile, step, result); !put) return protocol::to_problem(put.error());
@@ -361,6 +361,7 @@ class TiledJob {
       for (const PreviewMatch& match : view.value().matches)
         if (match.anchor < best.size() && match.rest_distance < best[match.anchor].rest_distance)
           best[match.anchor] = match;
+      file.value().release(0, file.value().bytes().size());
       moved.push_back({.file = std::move(file).value(), .samples = view.value().moved});
     }
     DifferenceSum differences;  // the last step's stay
@@ -441,11 +442,8 @@ class TiledJob {
       if (sample->index < begin || sample->index >= end) return false;  // a damaged result
       can = replace(*sample, chunk + (sample->index - begin) * records_.record_bytes) && can;
     }
-    const auto byte_of = [&](auto at) {
-      return static_cast<std::uint64_t>(reinterpret_cast<const std::byte*>(std::to_address(at)) -
-                                        moved.file.bytes().data());
-    };
-    moved.file.release(byte_of(first), byte_of(last));
+    // All of it: the search above has read pages here and there, too.
+    moved.file.release(0, moved.file.bytes().size());
     return can;
   }
 

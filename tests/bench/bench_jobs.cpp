@@ -1,4 +1,5 @@
 // Full-resolution jobs, each in a process of its own as the daemon starts them: speed and memory.
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,8 +30,18 @@ constexpr const char* kRecipe = R"({"format":"pointwright-recipe","version":1,"l
 
 struct JobFigures {
   double seconds = 0.0;
-  double peak_mb = 0.0;  // MiB
+  double cpu_seconds = 0.0;  // of all its threads
+  double peak_mb = 0.0;      // MiB
 };
+
+double cpu_of_children() {
+  rusage usage{};
+  ::getrusage(RUSAGE_CHILDREN, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
 
 class JobBench {
  public:
@@ -54,6 +65,7 @@ class JobBench {
     const std::string command = "'" POINTWRIGHT_PATH "' job run --json --recipe '" + folder_ +
                                 "/recipe.json' --in '" + folder_ + "/in.ply' --out '" + folder_ +
                                 "/out.ply' --threads " + std::to_string(thread_count());
+    const double cpu_before = cpu_of_children();
     std::FILE* const pipe = ::popen(command.c_str(), "r");  // NOLINT: a command line of our own
     if (pipe == nullptr) throw std::runtime_error("cannot start " POINTWRIGHT_PATH);
     std::string text;
@@ -63,6 +75,7 @@ class JobBench {
     if (::pclose(pipe) != 0) throw std::runtime_error("the job failed");
     const auto report = nlohmann::json::parse(text);
     return {.seconds = report.at("seconds").get<double>(),
+            .cpu_seconds = cpu_of_children() - cpu_before,
             .peak_mb = report.at("peak_memory_bytes").get<double>() / (1024.0 * 1024.0)};
   }
 
@@ -102,6 +115,7 @@ void bench_job_growth(BenchReport& report, const std::vector<std::uint64_t>& siz
     const auto n = static_cast<double>(size);
     const std::string label = "job." + std::to_string(size / 1'000'000) + "m.";
     report.add(label + "us_per_sample", "us/point", n, 1e6 * figures.seconds / n);
+    report.add(label + "cpu_us_per_sample", "us/point", n, 1e6 * figures.cpu_seconds / n);
     report.add(label + "rss_mb", "MB", n, figures.peak_mb);
     // The preview costs the same whatever the size, so what counts is what each further sample takes.
     const double slope = 1e6 * (figures.seconds - last_seconds) / (n - last_n);

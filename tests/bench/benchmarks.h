@@ -22,7 +22,7 @@ void bench_resampling(BenchReport& report);
 void bench_http(BenchReport& report);
 /// Likewise.
 void bench_jobs(BenchReport& report);
-/// Jobs on scans of these sizes, ascending, made and removed below `folder`: time and memory by size. Likewise.
+/// Likewise. Jobs on scans of these sizes, ascending, made and removed below `folder`: time and memory.
 void bench_job_growth(BenchReport& report, const std::vector<std::uint64_t>& sizes,
                       const std::string& folder);
 
