@@ -1121,7 +1121,8 @@ class _ResumableUpload:
                 if isinstance(error, Problem) and not isinstance(error, Overloaded) and error.status not in passing:
                     raise
                 failures += 1
-                if failures > self._client.retries:
+                is_untrusted = isinstance(error.__cause__, requests.exceptions.SSLError)
+                if is_untrusted or failures > self._client.retries:
                     raise
                 self._client._pause(failures - 1, getattr(error, "retry_after", None))
                 now = self._offset(location)

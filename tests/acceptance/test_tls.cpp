@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -268,10 +269,12 @@ TEST_CASE("files that do not serve are named with the reason at the start, and n
 TEST_CASE("the command line verifies certificate and name, by --ca or the system's authorities") {
   Certified tls;
   const std::string port = std::to_string(tls.daemon->port());
+  // Whoever asked again would pause for longer than that, and be ended.
+  constexpr std::chrono::seconds kLessThanThePauses(12);
   const auto ask = [&](const std::string& url, std::vector<std::string> more) {
     std::vector<std::string> command = {POINTWRIGHT_PATH, "cloud", "list", "--server", url};
     command.insert(command.end(), more.begin(), more.end());
-    return run(command);
+    return run(command, kLessThanThePauses);
   };
   std::ofstream(tls.folder / "sheet.ply") << file_of(wavy_sheet(20));
   const Ended uploaded = run(
@@ -285,6 +288,10 @@ TEST_CASE("the command line verifies certificate and name, by --ca or the system
   CHECK(unknown.err.find("certificate") != std::string::npos);
   write_certificate(tls.folder / "other.pem", tls.folder / "other.key");
   CHECK(ask(tls.url(), {"--ca", tls.folder / "other.pem"}).status == 3);
+  const Ended not_sent =
+      run({POINTWRIGHT_PATH, "upload", tls.folder / "sheet.ply", "--server", tls.url()}, kLessThanThePauses);
+  CHECK(not_sent.status == 3);
+  CHECK(not_sent.err.find("certificate") != std::string::npos);
   // A trusted certificate of another name.
   write_certificate(tls.folder / "named.pem", tls.folder / "named.key", "DNS:elsewhere.test");
   Daemon elsewhere({"--tls-cert", tls.folder / "named.pem", "--tls-key", tls.folder / "named.key"});

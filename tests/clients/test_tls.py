@@ -39,8 +39,24 @@ class OverTls(unittest.TestCase):
         for url, ca in ((self.daemon.url, None), (self.daemon.url, self.other), (elsewhere.url, named)):
             with self.assertRaisesRegex(Unreachable, "(?i)certificate"):
                 Client(url, ca=ca, backoff=60).info()
+            with self.assertRaisesRegex(Unreachable, "(?i)certificate"):
+                Client(url, ca=ca, backoff=60).upload(support.ply(support.sheet(20)))
         with self.assertRaises(ValueError):
             Client(self.daemon.url, ca="/nonexistent")
+
+    def test_a_certificate_that_changes_during_an_upload_ends_it_at_once(self):
+        data = support.ply(support.sheet(20))
+        with Client(self.daemon.url, ca=self.ca, backoff=60) as client:
+            parts = []
+
+            def distrust(done):
+                parts.append(done)
+                client._verify = self.other
+                client._http.close()  # connections that were verified before
+
+            with self.assertRaisesRegex(Unreachable, "(?i)certificate"):
+                client.upload(data, resumable=True, part_bytes=4096, progress=distrust)
+            self.assertEqual(len(parts), 1)
 
 
 if __name__ == "__main__":

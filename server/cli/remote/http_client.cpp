@@ -54,10 +54,13 @@ const char* trouble_of(httplib::Error error) {
   }
 }
 
+bool is_about_trust(httplib::Error error) {
+  return error == httplib::Error::SSLServerVerification || error == httplib::Error::SSLLoadingCerts;
+}
+
 bool never_left(httplib::Error error) {
   return error == httplib::Error::Connection || error == httplib::Error::ConnectionTimeout ||
-         error == httplib::Error::SSLConnection || error == httplib::Error::SSLServerVerification ||
-         error == httplib::Error::SSLLoadingCerts;
+         error == httplib::Error::SSLConnection || is_about_trust(error);
 }
 
 }  // namespace
@@ -157,6 +160,7 @@ HttpAnswer HttpClient::send(const HttpRequest& request) const {
   if (!result) {
     answer.trouble = trouble_of(result.error());
     answer.was_sent = !never_left(result.error());
+    answer.is_untrusted = is_about_trust(result.error());
     return answer;
   }
   answer.status = result->status;

@@ -17,6 +17,9 @@ struct HttpAnswer {
   std::string body;                            ///< empty where the caller took it
   std::string trouble;
   bool was_sent = false;  ///< without an answer: whether the server may have taken the request
+  /// Without an answer: the server's certificate is not to be trusted, or what would trust it cannot be read.
+  /// Asking again changes nothing.
+  bool is_untrusted = false;
 
   [[nodiscard]] std::string header(const std::string& name) const;
 };

@@ -119,7 +119,7 @@ bool RemoteService::has_feature(const std::string& name) const {
 }
 
 bool RemoteService::may_repeat(const HttpRequest& request, const HttpAnswer& answer) const {
-  if (request.write_body || answer.trouble == "cancelled") return false;
+  if (request.write_body || answer.is_untrusted || answer.trouble == "cancelled") return false;
   if (!answer.was_sent) return true;
   return !changes_once_more(request) || has_feature("idempotency-keys");
 }
