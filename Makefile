@@ -39,7 +39,7 @@ build: ## compile the daemon and the command-line tool, optimised (build/release
 	@$(call compile,release,pointwrightd pointwright)
 
 build-tests: ## compile everything, tests and benchmarks too (build/release)
-	@.ci/setup build
+	@.ci/setup build mpi
 	@mkdir -p build
 	@$(call compile,release,all)
 

@@ -46,8 +46,8 @@ struct JobTerms {
   double s = 1.0;
   Timing timing = Timing::kSequence;
   std::optional<CloudFormat> format = std::nullopt;  ///< of the result; none: the scan's, or PLY
-  std::uint64_t steps = 0;  ///< clouds of an animation from s = 0 on; 0: one cloud
-  std::string mode = {};    ///< of kJobModeNames; empty: tiles where that can be
+  std::uint64_t steps = 0;                           ///< clouds of an animation from s = 0 on; 0: one cloud
+  std::string mode = {};                             ///< of kJobModeNames; empty: tiles where that can be
   std::string launcher = std::string(kLocalLauncher);
   std::uint64_t priority = kUsualPriority;
 };

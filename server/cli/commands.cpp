@@ -184,7 +184,7 @@ CLI::App* add_remote_commands(CLI::App& app, RemoteCommands& remote, std::string
 
 }  // namespace
 
-int run_command(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
+int run_command(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err, Team* team) {
   CLI::App app("pointwright: point clouds on the command line");
   app.set_version_flag("--version", std::string("pointwright ") + POINTWRIGHT_VERSION);
   app.require_subcommand(1);
@@ -231,7 +231,7 @@ int run_command(const std::vector<std::string>& arguments, std::ostream& out, st
       out << bash_completion(app);
       return 0;
     }
-    if (job_command->parsed()) return run_job(job, out, err);
+    if (job_command->parsed()) return run_job(job, out, err, team);
     if (const auto status = remote.run(out, err)) return *status;
     if (convert_command->parsed()) return convert(options, out, err);
     if (smooth_command->parsed())

@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
@@ -21,8 +22,13 @@
 #include "server/ingest/files.h"
 #include "server/ingest/sandbox.h"
 #include "server/jobs/full_resolution.h"
+#include "server/jobs/team.h"
 
 namespace pointwright::server {
+
+using protocol::Problem;
+using protocol::ProblemKind;
+
 namespace {
 
 constexpr std::uint64_t kMostRecipeBytes = std::uint64_t{1} << 30U;
@@ -32,10 +38,7 @@ constexpr std::array<std::string_view, 3> kModeNames{"tiles", "memory", "direct"
 class Refusal {
  public:
   Refusal(std::ostream& out, std::ostream& err, bool events) : out_(out), err_(err), events_(events) {}
-  int operator()(const std::string& what, int status) const {
-    return (*this)(protocol::Problem{.kind = protocol::ProblemKind::kInvalidValue, .detail = what}, status);
-  }
-  int operator()(const protocol::Problem& problem, int status) const {
+  int operator()(const Problem& problem, int status) const {
     err_ << "pointwright: " << problem.detail << "\n";
     if (events_) out_ << protocol::to_text({{"problem", protocol::to_json(problem)}}) << std::endl;
     return status;
@@ -145,6 +148,8 @@ auto with_memory(int threads, Work work) -> decltype(work()) {
   try {
     with_threads(threads, [&] { outcome = work(); });
   } catch (const std::bad_alloc&) {
+  } catch (const std::exception& error) {
+    outcome = Problem{.kind = ProblemKind::kInternalError, .detail = error.what()};
   }
   return outcome;
 }
@@ -157,6 +162,66 @@ void tell(std::ostream& out, const JobEstimate& estimate) {
       << static_cast<double>(estimate.disk_bytes) / kMebi << " MiB, of "
       << static_cast<double>(estimate.free_disk_bytes) / kMebi << " MiB that are free\ntime        about "
       << estimate.seconds << " s\n";
+}
+
+/// The job that the options ask for.
+Outcome<JobParams> params_of(const JobRunOptions& options) {
+  const auto wrong = [](std::string what) {
+    return Problem{.kind = ProblemKind::kInvalidValue, .detail = std::move(what)};
+  };
+  JobParams params;
+  params.input = options.input;
+  params.output = options.output;
+  params.folder = options.work.empty() ? options.output + ".job" : options.work;
+  params.preview_count = options.preview_count;
+  params.neighbors = options.neighbors;
+  params.memory_bytes = options.memory_mebibytes << 20U;
+  params.steps = options.steps;
+  params.confined = options.confined;
+  params.most_bytes = options.most_mebibytes << 20U;
+  params.drop_non_finite = options.drop_non_finite;
+  if (const auto mode = std::find(kModeNames.begin(), kModeNames.end(), options.mode);
+      mode != kModeNames.end())
+    params.mode = static_cast<JobMode>(mode - kModeNames.begin());
+  auto text = read_file(options.recipe, kMostRecipeBytes);
+  if (!text) return wrong(options.recipe + ": " + text.error().message);
+  auto request = parse_recipe_file({reinterpret_cast<const char*>(text.value().data()), text.value().size()});
+  if (!request.ok()) return wrong(options.recipe + ": " + request.errors().summary());
+  params.request = std::move(request).value();
+  params.request.s = options.s.value_or(params.request.s);
+  if (!(params.request.s >= 0.0 && params.request.s <= 1.0)) return wrong("--s lies between 0 and 1");
+  if (!options.timing.empty())
+    params.request.timing = options.timing == protocol::kTimingNames[1] ? protocol::Timing::kTogether
+                                                                        : protocol::Timing::kSequence;
+  if (!options.preview.empty()) {
+    auto preview = read_local_cloud(options.preview, {}, std::numeric_limits<std::uint64_t>::max());
+    if (!preview) return wrong(options.preview + ": " + preview.error().message);
+    params.preview = std::make_shared<const Cloud>(std::move(preview.value().cloud));
+  }
+  return params;
+}
+
+void tell(std::ostream& out, const JobReport& report, double seconds) {
+  out << "samples     " << report.samples << ", of which " << report.moved << " moved";
+  if (report.inserted > 0) out << ", and " << report.inserted << " were inserted";
+  out << "\nmode        " << kModeNames[static_cast<std::size_t>(report.mode)];
+  if (report.tiles > 0) out << ", " << report.tiles << " of them";
+  if (report.tiles_kept > 0) out << " (" << report.tiles_kept << " were done already)";
+  out << "\npreview     " << report.preview_samples << " samples; " << report.matched
+      << " of them differ from the result by " << report.rms_difference << " rms, " << report.max_difference
+      << " at most\nspacing     " << report.spacing << "\ntime        " << seconds << " s, "
+      << (peak_memory_bytes() >> 20U) << " MiB at most\n";
+  if (report.files.size() > 1)
+    out << "files       " << report.files.size() << ", " << report.files.front() << " to "
+        << report.files.back() << "\n";
+}
+
+void tell_as(const JobRunOptions& options, std::ostream& out, const char* name,
+             const protocol::JsonDocument& document) {
+  if (options.events)
+    out << protocol::to_text({{name, document}}) << std::endl;
+  else
+    out << protocol::to_text(document) << "\n";
 }
 
 }  // namespace
@@ -210,86 +275,53 @@ CLI::App* add_job_run(CLI::App& group, JobRunOptions& options) {
   return command;
 }
 
-int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err) {
-  const Refusal refuse(out, err, options.events);
+int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err, Team* team) {
+  std::ostream nowhere(nullptr);
+  const bool leads = team == nullptr || team->leads();
+  const Refusal refuse(leads ? out : nowhere, leads ? err : nowhere, options.events);
   bound_memory(options.most_mebibytes << 20U);
-  JobParams params;
-  params.input = options.input;
-  params.output = options.output;
-  params.folder = options.work.empty() ? options.output + ".job" : options.work;
-  params.preview_count = options.preview_count;
-  params.neighbors = options.neighbors;
-  params.memory_bytes = options.memory_mebibytes << 20U;
-  if (!options.mode.empty()) {
-    const auto mode = std::find(kModeNames.begin(), kModeNames.end(), options.mode);
-    if (mode == kModeNames.end()) return refuse("--mode is tiles, memory or direct", 2);
-    params.mode = static_cast<JobMode>(mode - kModeNames.begin());
+  auto params = params_of(options);
+  if (!params.ok()) {
+    // Said by every one: the others may have read what this one cannot.
+    Refusal(out, err, options.events)(params.problem(), 1);
+    if (team != nullptr) team->abandon();
+    return 1;
   }
-  auto text = read_file(options.recipe, kMostRecipeBytes);
-  if (!text) return refuse(options.recipe + ": " + text.error().message, 1);
-  auto request = parse_recipe_file({reinterpret_cast<const char*>(text.value().data()), text.value().size()});
-  if (!request.ok()) return refuse(options.recipe + ": " + request.errors().summary(), 1);
-  params.request = std::move(request).value();
-  if (options.s && !(*options.s >= 0.0 && *options.s <= 1.0)) return refuse("--s lies between 0 and 1", 2);
-  params.request.s = options.s.value_or(params.request.s);
-  if (!options.timing.empty())
-    params.request.timing = options.timing == protocol::kTimingNames[1] ? protocol::Timing::kTogether
-                                                                        : protocol::Timing::kSequence;
-  if (!options.preview.empty()) {
-    auto preview = read_local_cloud(options.preview, {}, std::numeric_limits<std::uint64_t>::max());
-    if (!preview) return refuse(options.preview + ": " + preview.error().message, 1);
-    params.preview = std::make_shared<const Cloud>(std::move(preview.value().cloud));
-  }
-  params.steps = options.steps;
-  params.confined = options.confined;
-  params.most_bytes = options.most_mebibytes << 20U;
-  params.drop_non_finite = options.drop_non_finite;
+  params.value().team = team;
   if (options.dry_run) {
-    const auto estimate =
-        with_memory(options.threads, [&] { return estimate_full_resolution(params, ExecutionContext()); });
+    if (!leads) return 0;
+    const auto estimate = with_memory(
+        options.threads, [&] { return estimate_full_resolution(params.value(), ExecutionContext()); });
     if (!estimate.ok()) return refuse(estimate.problem(), 1);
-    const protocol::JsonDocument document = to_json(estimate.value());
-    if (options.events)
-      out << protocol::to_text({{"estimate", document}}) << std::endl;
-    else if (options.json)
-      out << protocol::to_text(document) << "\n";
+    if (options.events || options.json)
+      tell_as(options, out, "estimate", to_json(estimate.value()));
     else
       tell(out, estimate.value());
     return 0;
   }
-  const bool is_silent = options.quiet || options.json;
-  ProgressLine line(options.events ? out : err, options.events ? Telling::kEvents
-                                                : is_silent    ? Telling::kNothing
-                                                               : Telling::kLine);
+  const bool is_silent = options.quiet || options.json || !leads;
+  ProgressLine line(options.events ? out : err, is_silent        ? Telling::kNothing
+                                                : options.events ? Telling::kEvents
+                                                                 : Telling::kLine);
   const auto begin = std::chrono::steady_clock::now();
   const auto outcome = with_memory(options.threads, [&] {
-    return run_full_resolution(params, ExecutionContext(), [&](const std::string& phase, double fraction) {
-      line.show(phase, fraction);
-    });
+    return run_full_resolution(
+        params.value(), ExecutionContext(),
+        [&](const std::string& phase, double fraction) { line.show(phase, fraction); });
   });
+  const bool is_lone = !outcome.ok() && (outcome.problem().kind == ProblemKind::kOutOfSpace ||
+                                         outcome.problem().kind == ProblemKind::kInternalError);
+  if (is_lone && team != nullptr) {
+    Refusal(out, err, options.events)(outcome.problem(), 1);  // the others know nothing of it
+    team->abandon();
+  }
   if (!outcome.ok()) return refuse(outcome.problem(), 1);
-  const JobReport& report = outcome.value();
+  if (!leads) return 0;
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  if (options.events) {
-    out << protocol::to_text({{"report", to_json(report, seconds)}}) << std::endl;
-    return 0;
-  }
-  if (options.json) {
-    out << protocol::to_text(to_json(report, seconds)) << "\n";
-    return 0;
-  }
-  out << "samples     " << report.samples << ", of which " << report.moved << " moved";
-  if (report.inserted > 0) out << ", and " << report.inserted << " were inserted";
-  out << "\nmode        " << kModeNames[static_cast<std::size_t>(report.mode)];
-  if (report.tiles > 0) out << ", " << report.tiles << " of them";
-  if (report.tiles_kept > 0) out << " (" << report.tiles_kept << " were done already)";
-  out << "\npreview     " << report.preview_samples << " samples; " << report.matched
-      << " of them differ from the result by " << report.rms_difference << " rms, " << report.max_difference
-      << " at most\nspacing     " << report.spacing << "\ntime        " << seconds << " s, "
-      << (peak_memory_bytes() >> 20U) << " MiB at most\n";
-  if (report.files.size() > 1)
-    out << "files       " << report.files.size() << ", " << report.files.front() << " to "
-        << report.files.back() << "\n";
+  if (options.events || options.json)
+    tell_as(options, out, "report", to_json(outcome.value(), seconds));
+  else
+    tell(out, outcome.value(), seconds);
   return 0;
 }
 

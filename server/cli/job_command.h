@@ -9,6 +9,8 @@
 
 namespace pointwright::server {
 
+class Team;
+
 struct JobRunOptions {
   std::string recipe;  ///< a file: a recipe, or a request with one, as POST …/recipe takes it
   std::string input;
@@ -36,7 +38,7 @@ struct JobRunOptions {
 CLI::App* add_job_run(CLI::App& group, JobRunOptions& options);
 
 /// Returns the exit status: 0, 1 where the work failed, 2 where the arguments are wrong. Progress goes to
-/// err, the report to out.
-int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err);
+/// err, the report to out; of a team the leader's alone.
+int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err, Team* team = nullptr);
 
 }  // namespace pointwright::server

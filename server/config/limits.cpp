@@ -94,7 +94,8 @@ constexpr std::array kTable = {
     LimitInfo{"token_shares", &Limits::token_shares, 0, 10'000, "share links of one token"},
     LimitInfo{"max_tokens", &Limits::max_tokens, 1, 10'000, "tokens, those that have expired included"},
     LimitInfo{"max_shares", &Limits::max_shares, 0, 10'000, "share links of all sessions together"},
-    LimitInfo{"max_jobs", &Limits::max_jobs, 1, 100'000, "jobs held at once, those that have ended included"},
+    LimitInfo{"max_jobs", &Limits::max_jobs, 1, 100'000,
+              "jobs held at once; those that ended longest ago, of whoever holds most, make room"},
     LimitInfo{"max_running_jobs", &Limits::max_running_jobs, 1, 64, "jobs that run at once"},
     LimitInfo{"job_tile_bytes", &Limits::job_tile_bytes, 64ULL << 20U, kTebi,
               "memory that a job in tiles keeps to"},
@@ -103,6 +104,7 @@ constexpr std::array kTable = {
     LimitInfo{"job_retention_s", &Limits::job_retention_s, 0, 1'000'000'000,
               "time after which a job that has ended is deleted with its results, seconds; 0: never"},
     LimitInfo{"token_jobs", &Limits::token_jobs, 0, 100'000, "jobs of one token that wait or run"},
+    LimitInfo{"token_imports", &Limits::token_imports, 0, 100'000, "imports of one token under way at once"},
 };
 
 }  // namespace

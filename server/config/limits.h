@@ -68,6 +68,7 @@ struct Limits {
   std::uint64_t max_job_bytes = 8ULL << 30U;
   std::uint64_t job_retention_s = 7ULL * 86'400ULL;
   std::uint64_t token_jobs = 8;
+  std::uint64_t token_imports = 8;
   friend bool operator==(const Limits&, const Limits&) = default;
 };
 

@@ -117,17 +117,26 @@ Outcome<SharedCloud> import_now(Service& service, const Request& request,
                       request.body_bytes(), import.value(), seal);
 }
 
+/// An import ends with the process: so does what is known of the request that has begun it.
+std::string import_key(const Request& request) {
+  return request.keyed == nullptr ? std::string() : request.keyed->key + "\n" + request.keyed->fingerprint;
+}
+
 /// Leaves it to the imports, with all that it needs.
 Outcome<protocol::ImportDocument> import_later(Service& service, const Request& request) {
+  if (auto begun = service.imports.find_key(request.caller.token, import_key(request)))
+    return std::move(*begun);
   if (names_upload(request.head)) {
     auto upload = lease_upload(service, request);
     if (!upload.ok()) return upload.problem();
     const auto held = std::make_shared<LeasedUpload>(std::move(upload.value()));
-    return service.imports.start(
-        {.name = held->import.name, .bytes = held->lease->record().length, .owner = request.caller.token},
-        [&service, held](const ExecutionContext& context) {
-          return import_upload(service, *held, {}, &context);
-        });
+    return service.imports.start({.name = held->import.name,
+                                  .bytes = held->lease->record().length,
+                                  .owner = request.caller.token,
+                                  .key = import_key(request)},
+                                 [&service, held](const ExecutionContext& context) {
+                                   return import_upload(service, *held, {}, &context);
+                                 });
   }
   const auto import = body_import(service, request);
   if (!import.ok()) return import.problem();
@@ -140,7 +149,10 @@ Outcome<protocol::ImportDocument> import_later(Service& service, const Request& 
   const auto body =
       std::make_shared<const Body>(Body{std::move(request.body), std::move(request.body_memory)});
   return service.imports.start(
-      {.name = import.value().name, .bytes = body->bytes.size(), .owner = request.caller.token},
+      {.name = import.value().name,
+       .bytes = body->bytes.size(),
+       .owner = request.caller.token,
+       .key = import_key(request)},
       [&service, body, import = import.value()](const ExecutionContext& context) {
         return import_cloud(service.clouds, service.decode, service.background, service.config.limits,
                             std::as_bytes(std::span(body->bytes.data(), body->bytes.size())), import, {},
@@ -161,6 +173,7 @@ Response upload_cloud(Service& service, const Request& request) {
   if (prefers(request.head, "respond-async")) {
     const auto import = import_later(service, request);
     if (!import.ok()) return problem_response(import.problem(), request);
+    if (request.keyed != nullptr) request.keyed->is_passing = true;
     return json_response(protocol::to_json(import.value()), 202)
         .with_header("Location", "/v1/imports/" + import.value().id)
         .with_header("Preference-Applied", "respond-async");

@@ -182,6 +182,10 @@ Outcome<JobQueue::NewJob> gather(Service& service, const Request& request, proto
   job.job.owner = request.caller.token;
   job.job.has_preview = part->session != nullptr || preview != nullptr;
   job.job.drop_non_finite = scan->cloud != nullptr && scan->cloud->document.report.dropped_non_finite > 0;
+  // The scan, which stays whatever becomes of the cloud or the upload, and what is made of it.
+  const std::uint64_t scan_bytes =
+      scan->upload != nullptr ? scan->upload->record().length : scan->cloud->document.bytes;
+  job.job.bytes = scan_bytes * (1 + std::max<std::uint64_t>(terms.steps, 1));
   job.job.result = std::string("result").append(file_type(*terms.format).extension);
   job.fill = [&service, part, preview, scan,
               recipe = std::move(recipe)](const std::string& folder) -> Outcome<Done> {
@@ -247,6 +251,8 @@ Response create_job(Service& service, const Request& request) {
   auto asked = parsed_body(request, protocol::parse_job_request, large_limits(service));
   if (!asked.ok()) return problem_response(asked.problem(), request);
   const bool only_validate = asked.value().validate;
+  auto quota = service.access.hold(request.caller, Quota::kJobs, 1);
+  if (!quota.ok()) return problem_response(quota.problem(), request);
   auto job = gather(service, request, std::move(asked.value()));
   if (!job.ok()) return problem_response(job.problem(), request);
   if (only_validate) {
@@ -254,9 +260,10 @@ Response create_job(Service& service, const Request& request) {
     if (!estimate.ok()) return problem_response(estimate.problem(), request);
     return json_response({{"estimate", std::move(estimate.value())}});
   }
-  auto quota = service.access.hold(request.caller, Quota::kJobs, 1);
-  if (!quota.ok()) return problem_response(quota.problem(), request);
+  auto stored = service.access.hold(request.caller, Quota::kStoredBytes, job.value().job.bytes);
+  if (!stored.ok()) return problem_response(stored.problem(), request);
   job.value().job.quota = std::move(quota.value());
+  job.value().job.stored = std::move(stored.value());
   const auto answer = [](const protocol::JobDocument& document) {
     return json_response(protocol::to_json(document), 202).with_header("Location", "/v1/jobs/" + document.id);
   };

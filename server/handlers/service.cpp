@@ -20,7 +20,7 @@ std::size_t pool_threads(const Config& config) {
 
 /// The program that does jobs: the one of the settings, or the one that is installed with the daemon.
 std::string worker_program(const Config& config) {
-  if (!config.worker.empty()) return config.worker;
+  if (!config.worker.empty()) return std::filesystem::absolute(config.worker).string();
   std::error_code none;
   const auto self = std::filesystem::read_symlink("/proc/self/exe", none);
   return (self.parent_path() / "pointwright").string();
@@ -46,7 +46,7 @@ Service::Service(Config settings, ServiceParts parts)
       access(config.limits, token_file(config), kept_shares.get()),
       clouds(config.limits, archive.get(), cloud_loader(decode_file, decode, background, config.limits)),
       images(config.limits, archive.get()),
-      uploads(config.limits, folder.uploads()),
+      uploads(config.limits, folder.uploads(), folder.jobs()),
       sessions(
           config.limits, clouds,
           {.interactive = interactive,
@@ -98,9 +98,11 @@ std::vector<std::string> Service::recover() {
     if (damaged_shares > 0)
       notes.push_back(std::to_string(damaged_shares) + " share links are damaged and open nothing");
     if (damaged == 0) archive->sweep();
-    for (std::string& note :
-         jobs.recover([this](const std::string& owner) { return access.hold_again(owner, Quota::kJobs, 1); }))
-      notes.push_back(std::move(note));
+    const auto hold = [this](KeptJob& job) {
+      if (!job.document.has_ended()) job.quota = access.hold_again(job.owner, Quota::kJobs, 1);
+      job.stored = access.hold_again(job.owner, Quota::kStoredBytes, job.bytes);
+    };
+    for (std::string& note : jobs.recover(hold)) notes.push_back(std::move(note));
   } catch (const DatabaseError& error) {
     throw std::runtime_error(std::string("the database cannot be read: ") + error.what());
   }
@@ -130,6 +132,9 @@ Response answer_once(Service& service, const Request& request, Handler handler) 
                             request);
   std::string asked = std::string(method_name(request.head.method)) + "\n" + request.head.path + "\n";
   for (const auto& [name, value] : request.head.query) asked += name + "=" + value + "\n";
+  // What it asks for is not in the body alone.
+  for (const char* const name : {"content-type", "prefer"})
+    asked += std::string(request.head.header(name).value_or("")) + "\n";
   asked += sha256_hex(request.body_bytes());
   request.keyed = std::make_shared<KeyedRequest>(
       KeyedRequest{.caller = request.caller.token + request.caller.session.value_or(""),
@@ -145,7 +150,8 @@ Response answer_once(Service& service, const Request& request, Handler handler) 
         .with_header("Idempotency-Replayed", "true");
   Response response = handler(service, request);
   // Where the effect was none, or does not last either, the answer is kept by itself.
-  if (response.status < 300 && !(request.keyed->answer && service.archive != nullptr))
+  const bool is_kept = request.keyed->is_passing || (request.keyed->answer && service.archive != nullptr);
+  if (response.status < 300 && !is_kept)
     if (auto kept = service.answers.put(kept_answer(*request.keyed, response)); !kept.ok())
       return problem_response(kept.problem(), request);
   return response;

@@ -108,6 +108,7 @@ struct KeyedRequest {
   std::string key;
   std::string fingerprint;
   std::optional<Response> answer = std::nullopt;  ///< once it was kept with the change
+  bool is_passing = false;                        ///< the effect ends with the process: so must the answer
 };
 
 /// What the body of a route may be.

@@ -104,6 +104,8 @@ std::optional<pid_t> start_child(const ChildPlan& wanted) {
   for (std::size_t i = 0; i < far.size(); ++i)
     plan.require(posix_spawn_file_actions_adddup2(&plan.actions, far[i].get(), static_cast<int>(3 + i)));
   plan.require(posix_spawn_file_actions_addclosefrom_np(&plan.actions, static_cast<int>(3 + far.size())));
+  if (!wanted.folder.empty())
+    plan.require(posix_spawn_file_actions_addchdir_np(&plan.actions, wanted.folder.c_str()));
   if (!plan.good) return std::nullopt;
   std::vector<std::string> texts = wanted.arguments;
   std::vector<char*> arguments;

@@ -29,6 +29,7 @@ struct ChildPlan {
   std::vector<std::string> arguments = {};  ///< the first one is its name
   int output = -1;                          ///< its standard output; -1: /dev/null. Its input is always that
   int errors = -1;                          ///< its standard error; the same
+  std::string folder = {};                  ///< that it starts in; empty: ours
   std::vector<int> descriptors = {};        ///< as 3, 4, …
   /// It begins a process group, to be ended with all that it starts.
   bool leads_group = false;

@@ -1,9 +1,13 @@
 #include "server/jobs/full_resolution.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -14,6 +18,7 @@
 #include "server/ingest/files.h"
 #include "server/jobs/recipe_script.h"
 #include "server/jobs/scan_source.h"
+#include "server/jobs/team.h"
 #include "server/jobs/tiled_job.h"
 
 namespace pointwright::server {
@@ -77,7 +82,7 @@ class MemoryJob {
     played.script.spacing_ratio = static_cast<float>(
         std::min(1.0, std::sqrt(static_cast<double>(preview->size()) / static_cast<double>(cloud->size()))));
     report_.spacing = static_cast<double>(played.script.bases.spacing * played.script.spacing_ratio);
-    if (auto made = edit(cloud, levels.value(), played, {.grid = grid}, format.value()); !made)
+    if (auto made = edit(cloud, played, {.grid = grid}, format.value()); !made)
       return protocol::to_problem(made.error());
     progress_("done", 1.0);
     return report_;
@@ -95,12 +100,16 @@ class MemoryJob {
     return moved;
   }
 
-  Result<void> edit(const std::shared_ptr<const Cloud>& cloud, const HierarchyParams& levels,
-                    PlayedSteps& played, const ExportParams& params, CloudFormat format) {
+  Result<void> edit(const std::shared_ptr<const Cloud>& cloud, PlayedSteps& played,
+                    const ExportParams& params, CloudFormat format) {
     progress_("edits", 0.3);
     if (report_.mode == JobMode::kDirect) {
       played.script.edits = played.steps.back().edits;
-      auto state = edit_directly(played.script, cloud, levels, context_);
+      // Its own levels at the recipe's scales, which are lengths: whatever part of it the preview shows.
+      const auto own = hierarchy_for(params_.request.recipe, *cloud, params_.neighbors);
+      if (!own.ok())
+        return Error{.code = ErrorCode::kInvalidArgument, .message = own.problem().detail, .field = {}};
+      auto state = edit_directly(played.script, cloud, own.value(), context_);
       if (!state) return state.error();
       const Edited edited{.sampling = state.value().samples->sampling,
                           .finest = state.value().surface->finest()};
@@ -185,26 +194,47 @@ std::vector<std::string> outputs_of(const JobParams& params) {
   return names;
 }
 
-Outcome<ChosenMode> choose_mode(const JobParams& params) {
-  const bool splits = resamples(params.request);
+namespace {
+
+Problem invalid(const char* detail) {
+  return {.kind = ProblemKind::kInvalidValue, .detail = detail};
+}
+
+/// What no mode can do.
+std::optional<Problem> check(const JobParams& params) {
   if (params.steps && (*params.steps < 2 || *params.steps > kMaxJobSteps))
-    return Problem{.kind = ProblemKind::kInvalidValue,
-                   .detail = "steps must lie between 2 and " + std::to_string(kMaxJobSteps),
-                   .limit = static_cast<double>(kMaxJobSteps),
-                   .actual = static_cast<double>(*params.steps)};
+    return Problem{
+        .kind = ProblemKind::kInvalidValue,
+        .detail = std::string("steps must lie between 2 and ").append(std::to_string(kMaxJobSteps)),
+        .limit = static_cast<double>(kMaxJobSteps),
+        .actual = static_cast<double>(*params.steps)};
   if (params.steps && params.mode == JobMode::kDirect)
-    return Problem{.kind = ProblemKind::kInvalidValue,
-                   .detail = "steps are made in tiles or in memory, not in the mode direct"};
+    return invalid("steps are made in tiles or in memory, not in the mode direct");
+  std::error_code ignored;
   for (const std::string& output : outputs_of(params)) {
-    std::error_code ignored;
     if (std::filesystem::equivalent(params.input, output, ignored))
-      return Problem{.kind = ProblemKind::kInvalidValue, .detail = "a job does not write over its own input"};
+      return invalid("a job does not write over its own input");
+    if (std::filesystem::is_directory(output, ignored)) return invalid("the output is a folder");
   }
+  const std::string folder = std::filesystem::path(params.output).parent_path().string();
+  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+    return Problem{.kind = ProblemKind::kInvalidValue,
+                   .detail = std::string("the output cannot be written: ")
+                                 .append(folder.empty() ? "." : folder)
+                                 .append(": ")
+                                 .append(std::system_category().message(errno))};
+  return std::nullopt;
+}
+
+}  // namespace
+
+Outcome<ChosenMode> choose_mode(const JobParams& params) {
+  if (auto problem = check(params)) return *problem;
+  const bool splits = resamples(params.request);
   if (params.mode && *params.mode != JobMode::kTiles)
     return ChosenMode{.mode = *params.mode, .file = {}, .records = {}};
   if (splits && params.mode)
-    return Problem{.kind = ProblemKind::kInvalidValue,
-                   .detail = "edits with resampling are not made in tiles: use the mode memory or direct"};
+    return invalid("edits with resampling are not made in tiles: use the mode memory or direct");
   if (splits) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
   auto file = MappedFile::open(params.input);
   if (!file) return protocol::to_problem(file.error());
@@ -225,11 +255,18 @@ Outcome<ChosenMode> choose_mode(const JobParams& params) {
 
 Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionContext& context,
                                        const JobProgress& progress) {
+  const std::unique_ptr<Team> alone = lone_team();
+  Team& team = params.team == nullptr ? *alone : *params.team;
   auto chosen = choose_mode(params);
-  if (!chosen.ok()) return chosen.problem();
-  if (chosen.value().mode != JobMode::kTiles)
-    return MemoryJob(params, chosen.value().mode, context, progress).run();
-  return run_tiles(params, *chosen.value().file, *chosen.value().records, context, progress);
+  if (auto problem = team.agree(chosen.ok() ? std::nullopt : std::optional(chosen.problem())))
+    return *problem;
+  if (chosen.value().mode == JobMode::kTiles)
+    return run_tiles(params, *chosen.value().file, *chosen.value().records, team, context, progress);
+  Outcome<JobReport> outcome = JobReport();
+  if (team.leads()) outcome = MemoryJob(params, chosen.value().mode, context, progress).run();
+  if (auto problem = team.agree(outcome.ok() ? std::nullopt : std::optional(outcome.problem())))
+    return *problem;
+  return outcome;
 }
 
 }  // namespace pointwright::server

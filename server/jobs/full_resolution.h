@@ -16,6 +16,8 @@
 
 namespace pointwright::server {
 
+class Team;
+
 enum class JobMode {
   kTiles,   ///< binary PLY and LAS: in tiles, in bounded memory, whatever the size
   kMemory,  ///< every format, and with resampling: the whole scan at once
@@ -40,6 +42,7 @@ struct JobParams {
   bool confined = false;
   std::uint64_t most_bytes = 0;  ///< of memory, for the report and the decoder; 0: all
   bool drop_non_finite = false;  ///< in the modes memory and direct
+  Team* team = nullptr;          ///< who does it together; null: this process alone
   /// An animation: so many clouds, 2 to kMaxJobSteps, of the recipe at s = 0 up to request.s in even steps.
   std::optional<std::uint32_t> steps = std::nullopt;
 };
@@ -85,6 +88,8 @@ using JobProgress = std::function<void(const std::string& phase, double fraction
 /// An animation decomposes the scan once; its last cloud is the plain job's. In tiles a job that was
 /// interrupted goes on where it was, where its folder, its input and its recipe are the same; the folder is
 /// removed in the end.
+/// A team's processes share the input, the output and the folder; each takes its part of every pass and of
+/// the tiles, and all get the same report. In the other modes the leader does it alone.
 /// Problems:    those of reading the input, of play_on_preview and of writing; kCancelled
 /// Promises:    samples that no edit moved keep their bytes; a recipe without effect gives the input's bytes
 /// Cost:        two passes over the input, 32 bytes of disk a sample and, for each cloud that is written, as

@@ -9,12 +9,11 @@
 #include "server/jobs/full_resolution.h"
 #include "server/jobs/recipe_script.h"
 #include "server/jobs/scan_source.h"
+#include "server/jobs/tile_store.h"
 
 namespace pointwright::server {
 namespace {
 
-/// Scratch of tiles: one record of a sample, and one more where it moves (tile_store.h).
-constexpr std::uint64_t kSpoolBytes = 64;
 /// Of the modes memory and direct, beside the cloud's own columns: neighbours, levels, bases, results.
 constexpr std::uint64_t kWorkingBytes = 400;
 /// Without a preview nothing can be timed: what two cores of 2023 do with two edits in two bands.
@@ -57,7 +56,7 @@ Outcome<JobEstimate> estimate_full_resolution(const JobParams& params, const Exe
   if (chosen.value().records) {
     estimate.samples = chosen.value().records->count;
     estimate.memory_bytes = params.memory_bytes;
-    estimate.disk_bytes = estimate.samples * kSpoolBytes + clouds * bytes;
+    estimate.disk_bytes = (1 + clouds) * sizeof(TileSample) * estimate.samples + clouds * bytes;
   } else {
     const auto scan = read_scan(params);
     if (!scan) return protocol::to_problem(scan.error());

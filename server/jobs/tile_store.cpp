@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
+#include <span>
+#include <system_error>
 #include <utility>
 
 #include "engine/core/parallel.h"
@@ -138,26 +140,57 @@ bool TileStore::read_index() {
   return true;
 }
 
-bool TileStore::is_sorted() {
-  return read_index();
+bool TileStore::is_sorted(std::uint64_t samples) {
+  std::error_code none;
+  const std::uint64_t bytes = std::filesystem::file_size(spool_path(folder_), none);
+  return !none && bytes == samples * sizeof(TileSample) && read_index();
 }
 
-Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
+bool TileStore::is_ours(const std::filesystem::path& path) {
+  // What is being written has a name of its own behind that.
+  const std::string name = path.filename().string();
+  const std::string whole = name.substr(0, name.find(".new-"));
+  return whole == "job.id" || whole == "samples.bin" || whole == "samples.index" ||
+         (whole.starts_with("tile-") && whole.ends_with(".result"));
+}
+
+void TileStore::clear() const {
+  std::error_code none;
+  for (const char* const name : {"job.id", "samples.index"})
+    std::filesystem::remove(folder_ + "/" + name, none);
+  std::vector<std::filesystem::path> ours;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_, none))
+    if (is_ours(entry.path())) ours.push_back(entry.path());
+  for (const auto& path : ours) std::filesystem::remove(path, none);
+}
+
+Result<void> TileStore::begin() const {
+  const std::string path = spool_path(folder_);
+  if (!opened(path, O_WRONLY | O_CREAT | O_TRUNC).is_open()) return file_error("cannot write", path, errno);
+  return {};
+}
+
+Result<void> TileStore::finish() const {
+  return write_file_atomically(index_path(folder_), index_bytes());
+}
+
+Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records, Team& team,
                              const ExecutionContext& context) {
   const std::string path = spool_path(folder_);
-  const Descriptor spool = opened(path, O_WRONLY | O_CREAT | O_TRUNC);
-  if (!spool.is_open()) return file_error("cannot write", path, errno);
+  const Descriptor spool = opened(path, O_WRONLY);
+  // Nobody leaves before all have met below.
+  std::atomic<int> failure{spool.is_open() ? 0 : errno};
   const std::byte* const first = file.bytes().data() + records.begin;
   // Every chunk has its place in the spool, so they may be sorted and written side by side.
   const auto chunks = static_cast<std::size_t>((records.count + kChunk - 1) / kChunk);
   std::vector<std::vector<std::pair<std::uint32_t, Extent>>> extents(chunks);
   std::atomic<std::size_t> next{0};
-  std::atomic<int> failure{0};  // errno
   const auto sort_chunks = [&] {
     std::vector<std::uint32_t> cells;
     std::vector<TileSample> sorted;
     std::vector<std::size_t> place(cuts_.cell_count() + 1);
     for (std::size_t chunk = next++; chunk < chunks; chunk = next++) {
+      if (!team.takes(chunk)) continue;
       if (context.is_cancelled() || failure != 0) return;
       const std::uint64_t begin = chunk * kChunk;
       const auto count = static_cast<std::size_t>(std::min(kChunk, records.count - begin));
@@ -195,13 +228,25 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
   };
   parallel_for(
       kChunksAtOnce, [&](std::size_t, std::size_t) { sort_chunks(); }, 1);
+  if (failure == 0 && ::fsync(spool.get()) != 0) failure = errno;
+  struct Placed {
+    std::uint64_t cell = 0;
+    Extent extent;
+  };
+  std::vector<Placed> mine;
+  for (const auto& of_chunk : extents)
+    for (const auto& [cell, extent] : of_chunk) mine.push_back({.cell = cell, .extent = extent});
+  extents_.assign(cuts_.cell_count(), {});
+  for (const auto& bytes : team.gather(std::as_bytes(std::span(mine)))) {
+    std::vector<Placed> theirs(bytes.size() / sizeof(Placed));
+    if (!theirs.empty()) std::memcpy(theirs.data(), bytes.data(), bytes.size());
+    for (const Placed& placed : theirs) extents_[placed.cell].push_back(placed.extent);
+  }
+  // In the scan's order, whoever sorted them.
+  for (auto& list : extents_) std::ranges::sort(list, {}, &Extent::first);
   if (context.is_cancelled()) return cancelled_error();
   if (failure != 0) return file_error("cannot write", path, failure);
-  if (::fsync(spool.get()) != 0) return file_error("cannot write", path, errno);
-  extents_.assign(cuts_.cell_count(), {});
-  for (const auto& of_chunk : extents)
-    for (const auto& [cell, extent] : of_chunk) extents_[cell].push_back(extent);
-  return write_file_atomically(index_path(folder_), index_bytes());
+  return {};
 }
 
 bool TileStore::read_cell(int spool, std::size_t cell, TileSample* to) const {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -14,6 +15,7 @@
 #include "engine/core/result.h"
 #include "server/jobs/mapped_file.h"
 #include "server/jobs/scan_records.h"
+#include "server/jobs/team.h"
 #include "server/jobs/tile_cuts.h"
 
 namespace pointwright::server {
@@ -47,18 +49,27 @@ struct TileInput {
   std::vector<std::uint32_t> by_index;  ///< the tile's own samples, in the scan's order
 };
 
-/// In a folder of its own. One process writes it.
+/// In a folder of its own. One team writes it.
 class TileStore {
  public:
   /// `origin`: what positions in tiles are relative to.
   TileStore(std::string folder, TileCuts cuts, const Vec3d& origin);
 
-  /// Whether sort() has come to its end in this folder before.
-  [[nodiscard]] bool is_sorted();
-  /// One pass over the scan: every sample into its tile.
+  /// Whether sort() has come to its end in this folder before, with so many samples.
+  [[nodiscard]] bool is_sorted(std::uint64_t samples);
+  /// Whether a job writes files of that name into its folder.
+  [[nodiscard]] static bool is_ours(const std::filesystem::path& path);
+  /// Deletes all that jobs have written into the folder: first what says that it is whole.
+  void clear() const;
+  /// The leader's, before anybody sorts. Errors: those of sort()
+  [[nodiscard]] Result<void> begin() const;
+  /// One pass over the scan: every sample into its tile. Done by all of the team.
   /// Errors: kTooLarge (the disk is full; field "path"), kInvalidArgument (it cannot be written), kCancelled
   /// Cost:   32 bytes of disk a sample, and 36 of memory for 2^22 samples
-  Result<void> sort(const MappedFile& file, const ScanRecords& records, const ExecutionContext& context);
+  Result<void> sort(const MappedFile& file, const ScanRecords& records, Team& team,
+                    const ExecutionContext& context);
+  /// The leader's, once all have sorted: from then on the folder is sorted. Errors: those of sort()
+  [[nodiscard]] Result<void> finish() const;
 
   [[nodiscard]] std::size_t tile_count() const { return cuts_.tile_count(); }
   [[nodiscard]] std::uint64_t sample_count(std::size_t tile) const;  ///< once sorted

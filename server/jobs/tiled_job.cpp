@@ -1,5 +1,7 @@
 #include "server/jobs/tiled_job.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 
@@ -8,6 +10,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -16,14 +19,17 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/simplification/subsample.h"
+#include "server/base/descriptor.h"
 #include "server/base/sha256.h"
 #include "server/ingest/files.h"
 #include "server/jobs/recipe_script.h"
+#include "server/jobs/result_writer.h"
 #include "server/jobs/scan_survey.h"
 #include "server/jobs/tile_store.h"
 
@@ -46,8 +52,6 @@ constexpr double kAround = 1.5;
 constexpr std::size_t kCellsOfTile = 16;
 constexpr std::uint64_t kCandidates = 5;  // for each sample of the preview
 constexpr std::uint64_t kLeastSurveyed = 200'000;
-constexpr std::uint64_t kWriteChunk = std::uint64_t{1} << 20U;  // samples
-constexpr std::size_t kChunksAtOnce = 2;
 
 /// Neighbourhoods around a sample that its own outcome depends on.
 std::uint32_t rings_of(const PlayedSteps& played) {
@@ -63,25 +67,30 @@ std::uint32_t rings_of(const PlayedSteps& played) {
 
 class TiledJob {
  public:
-  TiledJob(const JobParams& params, const MappedFile& file, const ScanRecords& records,
+  TiledJob(const JobParams& params, const MappedFile& file, const ScanRecords& records, Team& team,
            const ExecutionContext& context, const JobProgress& progress)
       : params_(params),
         file_(file),
         records_(records),
+        team_(team),
         context_(context),
         progress_(progress),
         outputs_(outputs_of(params)) {}
 
   Outcome<JobReport> run() {
     report_.samples = records_.count;
-    if (auto problem = look()) return *problem;
-    if (auto problem = check_disk()) return *problem;
-    if (auto problem = play()) return *problem;
+    if (auto problem = team_.agree(look())) return *problem;
+    if (auto problem = team_.agree(check_disk())) return *problem;
+    if (auto problem = team_.agree(play())) return *problem;
     if (auto problem = sort()) return *problem;
-    if (auto problem = edit_tiles()) return *problem;
+    if (auto problem = team_.agree(edit_tiles())) return *problem;
+    sum_tiles_kept();
     if (auto problem = write()) return *problem;
-    std::error_code ignored;
-    std::filesystem::remove_all(params_.folder, ignored);
+    if (team_.leads()) {
+      store_->clear();
+      std::error_code ignored;
+      std::filesystem::remove(params_.folder, ignored);  // unless there is something of others in it
+    }
     progress_("done", 1.0);
     return report_;
   }
@@ -93,14 +102,26 @@ class TiledJob {
     std::filesystem::create_directories(params_.folder, error);
     if (error)
       return Problem{.kind = ProblemKind::kStorageFailed, .detail = params_.folder + ": " + error.message()};
+    auto problem = team_.leads() ? lock() : std::nullopt;
+    if (auto any = team_.agree(problem)) return any;
     const std::uint64_t wanted = std::max(kCandidates * params_.preview_count, kLeastSurveyed);
-    auto found = survey(file_, records_, wanted, context_);
+    auto found = survey(file_, records_, wanted, team_, context_);
     if (!found) return protocol::to_problem(found.error());
     surveyed_ = std::move(found).value();
     candidates_ = chosen_cloud(surveyed_);
     if (candidates_.size() == 0)
       return Problem{.kind = ProblemKind::kInvalidValue, .detail = "the scan has no samples"};
     return std::nullopt;
+  }
+
+  /// The folder is this job's as long as it lives, however it ends.
+  std::optional<Problem> lock() {
+    lock_ = Descriptor(::open(params_.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!lock_.is_open())
+      return Problem{.kind = ProblemKind::kStorageFailed,
+                     .detail = params_.folder + ": " + std::system_category().message(errno)};
+    if (::flock(lock_.get(), LOCK_EX | LOCK_NB) == 0) return std::nullopt;
+    return Problem{.kind = ProblemKind::kWrongState, .detail = "another job works in " + params_.folder};
   }
 
   /// Room for the spool, the tiles' results and the output, before anything is written. What an interrupted
@@ -118,8 +139,12 @@ class TiledJob {
                    .device = status.st_dev};
     };
     std::uint64_t kept = 0;
-    for (const auto& entry : std::filesystem::directory_iterator(params_.folder))
-      if (entry.is_regular_file()) kept += entry.file_size();
+    std::error_code none;
+    for (const auto& entry : std::filesystem::directory_iterator(params_.folder, none))
+      if (std::error_code gone; TileStore::is_ours(entry.path()) && entry.is_regular_file(gone)) {
+        const std::uint64_t size = entry.file_size(gone);
+        if (!gone) kept += size;
+      }
     const std::uint64_t all = (1 + outputs_.size()) * sizeof(TileSample) * records_.count;
     const std::uint64_t scratch = all - std::min(all, kept);
     const std::uint64_t output = outputs_.size() * file_.bytes().size();
@@ -172,10 +197,11 @@ class TiledJob {
     const std::array<std::uint64_t, 5> numbers{records_.count, most, params_.neighbors, rings_,
                                                outputs_.size()};
     add(numbers.data(), sizeof numbers);
+    add(&surveyed_.digest, sizeof surveyed_.digest);
+    add(&played_.script.origin, sizeof(Vec3d));
+    for (const double scale : params_.request.recipe.level_scales) add(&scale, sizeof scale);
     add(&surveyed_.min, sizeof(Vec3d));
     add(&surveyed_.max, sizeof(Vec3d));
-    for (const Vec3d& p : surveyed_.position) add(&p, sizeof p);
-    for (const Vec3f& n : surveyed_.normal) add(&n, sizeof n);
     add_points(played_.rest);
     for (const PlayedSteps::Step& step : played_.steps) {
       add_points(step.result);
@@ -208,19 +234,49 @@ class TiledJob {
 
     const std::string marker = params_.folder + "/job.id";
     const std::string id = identity(most);
-    const auto kept = read_file(marker, 1024);
     const auto as_bytes_of = [](const std::string& text) {
       return std::as_bytes(std::span(text.data(), text.size()));
     };
-    const bool same = kept && std::ranges::equal(kept.value(), as_bytes_of(id));
-    if (same && store_->is_sorted()) return std::nullopt;
-    for (const auto& entry : std::filesystem::directory_iterator(params_.folder))
-      if (entry.path().extension() == ".result") std::filesystem::remove(entry.path());
-    if (auto sorted = store_->sort(file_, records_, context_); !sorted)
-      return protocol::to_problem(sorted.error());
-    if (auto marked = write_file_atomically(marker, as_bytes_of(id)); !marked)
-      return protocol::to_problem(marked.error());
+    const auto kept = read_file(marker, 1024);
+    const bool same =
+        team_.told(kept && std::ranges::equal(kept.value(), as_bytes_of(id)) ? "same" : "other") == "same";
+    const auto unread = [&]() -> std::optional<Problem> {
+      if (!same || store_->is_sorted(records_.count)) return std::nullopt;
+      return Problem{.kind = ProblemKind::kInternalError, .detail = "the tiles' index is not whole"};
+    };
+    if (same && !team_.agree(unread())) return std::nullopt;
+    std::optional<Problem> problem;
+    if (team_.leads()) problem = begin_sorting();
+    if (auto any = team_.agree(problem)) return any;
+    if (auto sorted = store_->sort(file_, records_, team_, context_); !sorted)
+      problem = protocol::to_problem(sorted.error());
+    if (auto any = team_.agree(problem)) return any;
+    if (team_.leads())
+      if (auto marked = store_->finish(); !marked) problem = protocol::to_problem(marked.error());
+    if (team_.leads() && !problem)
+      if (auto marked = write_file_atomically(marker, as_bytes_of(id)); !marked)
+        problem = protocol::to_problem(marked.error());
+    return team_.agree(problem);
+  }
+
+  /// What is left of another job goes, what says that it is whole first.
+  [[nodiscard]] std::optional<Problem> begin_sorting() const {
+    store_->clear();
+    if (!sync_folder(params_.folder))
+      return Problem{.kind = ProblemKind::kStorageFailed,
+                     .detail = params_.folder + ": " + std::system_category().message(errno)};
+    if (auto begun = store_->begin(); !begun) return protocol::to_problem(begun.error());
     return std::nullopt;
+  }
+
+  void sum_tiles_kept() {
+    const std::uint64_t mine = report_.tiles_kept;
+    report_.tiles_kept = 0;
+    for (const auto& bytes : team_.gather(std::as_bytes(std::span(&mine, 1)))) {
+      std::uint64_t theirs = 0;
+      std::memcpy(&theirs, bytes.data(), sizeof theirs);
+      report_.tiles_kept += theirs;
+    }
   }
 
   std::optional<Problem> edit_tiles() {
@@ -242,7 +298,8 @@ class TiledJob {
       const std::lock_guard lock(mutex);
       if (failure) return false;
       progress_("tile " + std::to_string(tile + 1) + " of " + std::to_string(store_->tile_count()),
-                0.2 + 0.7 * static_cast<double>(done) / static_cast<double>(records_.count));
+                0.2 + 0.7 * std::min(1.0, static_cast<double>(done) * static_cast<double>(team_.size()) /
+                                              static_cast<double>(records_.count)));
       done += store_->sample_count(tile);
       // Steps come in their order.
       if (store_->has_result(tile, outputs_.size() - 1)) {
@@ -255,7 +312,7 @@ class TiledJob {
         kTilesAtOnce,
         [&](std::size_t, std::size_t) {
           for (std::size_t tile = next++; tile < store_->tile_count(); tile = next++) {
-            if (!begin_tile(tile)) continue;
+            if (!team_.takes(tile) || !begin_tile(tile)) continue;
             if (auto problem = edit_tile(tile, anchors, least_ring)) fail(std::move(*problem));
           }
         },
@@ -333,12 +390,6 @@ class TiledJob {
     return !(length > 1e-6F) || !std::isfinite(length) ? false : Vec3f(before / length) != after;
   }
 
-  /// A tile's result on the disk.
-  struct MovedSamples {
-    MappedFile file;
-    std::span<const TileSample> samples;  // by index
-  };
-
   std::optional<Problem> write() {
     for (std::size_t step = 0; step < outputs_.size(); ++step)
       if (auto problem = write(step)) return problem;
@@ -352,7 +403,7 @@ class TiledJob {
     std::vector<MovedSamples> moved;
     std::vector<PreviewMatch> best(played_.rest.size(), {.rest_distance = std::numeric_limits<float>::max()});
     for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
-      if (!store_->has_result(tile, step)) continue;
+      if (store_->sample_count(tile) == 0) continue;
       auto file = MappedFile::open(store_->result_path(tile, step));
       if (!file) return protocol::to_problem(file.error());
       auto view = view_result(file.value().bytes());
@@ -370,10 +421,9 @@ class TiledJob {
         differences.add(static_cast<double>(match.difference));
     differences.report(report_);
 
-    const auto written =
-        fill_file_atomically(outputs_[step], [&](int out) { return write_records(step, out, moved); });
-    if (!written) return protocol::to_problem(written.error());
-    return std::nullopt;
+    ResultWriter writer(file_, records_, team_, played_.script.origin, context_,
+                        [&](double part) { progress_result(step, part); });
+    return writer.write(outputs_[step], moved);
   }
 
   void progress_result(std::size_t step, double part) const {
@@ -381,86 +431,10 @@ class TiledJob {
               0.9 + 0.1 * (static_cast<double>(step) + part) / static_cast<double>(outputs_.size()));
   }
 
-  /// False: errno says why.
-  Result<bool> write_records(std::size_t step, int out, const std::vector<MovedSamples>& moved) {
-    const std::span<const std::byte> bytes = file_.bytes();
-    if (!write_all_at(out, bytes.first(static_cast<std::size_t>(records_.begin)), 0)) return false;
-    // Every chunk has its place in the file, so they may be made and written side by side.
-    const std::uint64_t chunks = (records_.count + kWriteChunk - 1) / kWriteChunk;
-    std::atomic<std::uint64_t> next{0};
-    std::atomic<bool> unsaid{false};
-    std::atomic<int> failure{0};  // errno
-    std::mutex mutex;             // guards the progress
-    std::uint64_t done = 0;
-    const auto write_chunks = [&] {
-      std::vector<std::byte> chunk;
-      for (std::uint64_t k = next++; k < chunks; k = next++) {
-        if (context_.is_cancelled() || failure != 0 || unsaid) return;
-        const std::uint64_t begin = k * kWriteChunk;
-        const std::uint64_t end = std::min(records_.count, begin + kWriteChunk);
-        const std::uint64_t from = records_.begin + begin * records_.record_bytes;
-        const std::uint64_t to = records_.begin + end * records_.record_bytes;
-        chunk.assign(bytes.begin() + static_cast<std::ptrdiff_t>(from),
-                     bytes.begin() + static_cast<std::ptrdiff_t>(to));
-        // Tiles share no sample, so they can be put in side by side.
-        parallel_for(
-            moved.size(),
-            [&](std::size_t first, std::size_t last) {
-              for (std::size_t tile = first; tile < last; ++tile)
-                if (!replace(moved[tile], begin, end, chunk.data())) unsaid = true;
-            },
-            1);
-        if (unsaid) return;
-        if (!write_all_at(out, chunk, from)) failure = errno;
-        file_.release(from, to);
-        const std::lock_guard lock(mutex);
-        progress_result(step, static_cast<double>(++done) / static_cast<double>(chunks + 1));
-      }
-    };
-    parallel_for(
-        kChunksAtOnce, [&](std::size_t, std::size_t) { write_chunks(); }, 1);
-    if (context_.is_cancelled()) return cancelled_error();
-    if (unsaid)
-      return Error{.code = ErrorCode::kInvalidArgument,
-                   .message =
-                       "the edits take samples to where the file's whole numbers cannot say them: the "
-                       "mode memory chooses a grid that can, and so does PLY",
-                   .field = "deformation"};
-    if (failure == 0 &&
-        write_all_at(out, bytes.subspan(static_cast<std::size_t>(records_.end())), records_.end()))
-      return true;
-    if (failure != 0) errno = failure;
-    return false;
-  }
-
-  /// Puts the tile's samples begin .. end - 1 into the chunk. False: a record cannot say the place.
-  bool replace(const MovedSamples& moved, std::uint64_t begin, std::uint64_t end, std::byte* chunk) const {
-    const auto first = std::ranges::lower_bound(moved.samples, begin, {}, &TileSample::index);
-    const auto last = std::ranges::lower_bound(first, moved.samples.end(), end, {}, &TileSample::index);
-    bool can = true;
-    for (auto sample = first; sample != last; ++sample) {
-      if (sample->index < begin || sample->index >= end) return false;  // a damaged result
-      can = replace(*sample, chunk + (sample->index - begin) * records_.record_bytes) && can;
-    }
-    // All of it: the search above has read pages here and there, too.
-    moved.file.release(0, moved.file.bytes().size());
-    return can;
-  }
-
-  /// False: the record cannot say the place.
-  bool replace(const TileSample& sample, std::byte* record) const {
-    const Vec3f p(sample.position[0], sample.position[1], sample.position[2]);
-    const Vec3d place = played_.script.origin + p.cast<double>();
-    if (!records_.can_say(place)) return false;
-    records_.set_position(record, place);
-    if (records_.has_normals())
-      records_.set_normal(record, {sample.normal[0], sample.normal[1], sample.normal[2]});
-    return true;
-  }
-
   const JobParams& params_;
   const MappedFile& file_;
   const ScanRecords& records_;
+  Team& team_;
   const ExecutionContext& context_;
   const JobProgress& progress_;
   JobReport report_;
@@ -470,14 +444,15 @@ class TiledJob {
   const std::vector<std::string> outputs_;  // one for each step
   PlayedSteps played_;
   std::uint32_t rings_ = 1;
+  Descriptor lock_;  // on the folder; the leader's
   std::optional<TileStore> store_;
 };
 
 }  // namespace
 
 Outcome<JobReport> run_tiles(const JobParams& params, const MappedFile& file, const ScanRecords& records,
-                             const ExecutionContext& context, const JobProgress& progress) {
-  return TiledJob(params, file, records, context, progress).run();
+                             Team& team, const ExecutionContext& context, const JobProgress& progress) {
+  return TiledJob(params, file, records, team, context, progress).run();
 }
 
 void DifferenceSum::add(double difference) {

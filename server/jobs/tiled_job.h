@@ -8,12 +8,13 @@
 #include "server/jobs/full_resolution.h"
 #include "server/jobs/mapped_file.h"
 #include "server/jobs/scan_records.h"
+#include "server/jobs/team.h"
 
 namespace pointwright::server {
 
-/// JobMode::kTiles.
+/// JobMode::kTiles. Done by all of the team.
 Outcome<JobReport> run_tiles(const JobParams& params, const MappedFile& file, const ScanRecords& records,
-                             const ExecutionContext& context, const JobProgress& progress);
+                             Team& team, const ExecutionContext& context, const JobProgress& progress);
 
 /// Root mean square and greatest of what came apart, into the report.
 class DifferenceSum {

@@ -32,7 +32,8 @@ std::string terms_row(const KeptJob& job) {
                                         {"created", to_ms(job.document.created)},
                                         {"preview", job.has_preview},
                                         {"drop", job.drop_non_finite},
-                                        {"result", job.result}});
+                                        {"result", job.result},
+                                        {"bytes", job.bytes}});
 }
 
 std::string state_row(const JobDocument& job) {
@@ -63,6 +64,7 @@ void read_terms(KeptJob& job, const std::string& text) {
   job.has_preview = row.at("preview").get<bool>();
   job.drop_non_finite = row.at("drop").get<bool>();
   job.result = row.at("result").get<std::string>();
+  job.bytes = row.at("bytes").get<std::uint64_t>();
 }
 
 void read_state(JobDocument& job, const std::string& text) {

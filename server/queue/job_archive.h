@@ -2,6 +2,7 @@
 // Jobs as rows of the database.
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,8 +20,10 @@ struct KeptJob {
   std::string owner;
   bool has_preview = false;  ///< the recipe is played on a cloud of its own
   bool drop_non_finite = false;
-  std::string result;                      ///< the name of the file that it makes
-  std::shared_ptr<const void> quota = {};  ///< its part of the owner's; not kept
+  std::string result;                       ///< the name of the file that it makes
+  std::uint64_t bytes = 0;                  ///< that its scan and its results may take on the disk
+  std::shared_ptr<const void> quota = {};   ///< its part of the owner's jobs; not kept
+  std::shared_ptr<const void> stored = {};  ///< its part of the owner's stored bytes; not kept
 };
 
 /// Thread-safe. Changes are on the disk when they return, where the database lasts. Problems of all of them:

@@ -1,19 +1,13 @@
 #include "server/queue/job_queue.h"
 
-#include <fcntl.h>
-
 #include <algorithm>
-#include <csignal>
-#include <cstring>
 #include <exception>
 #include <filesystem>
-#include <sstream>
+#include <map>
 #include <system_error>
 #include <utility>
 
-#include "server/base/file_types.h"
 #include "server/base/random_id.h"
-#include "server/base/sha256.h"
 #include "server/ingest/files.h"
 #include "server/queue/worker_process.h"
 #include "server/queue/worker_words.h"
@@ -31,12 +25,9 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr const char* kLogName = "log";
-constexpr const char* kPidName = "worker.pid";
 constexpr std::chrono::seconds kSweepInterval{10};
 constexpr std::chrono::seconds kRetryPause{1};
 constexpr std::chrono::seconds kValidationDeadline{60};
-/// A worker that daemons were ended under so often is not started again by itself.
-constexpr std::uint64_t kMostAttempts = 20;
 /// Before this part is done nobody knows how long the rest takes.
 constexpr double kLeastFraction = 0.05;
 
@@ -47,53 +38,6 @@ Problem no_such_job() {
 void remove_folder(const std::string& folder) {
   std::error_code none;  // what stays goes with the next start
   std::filesystem::remove_all(folder, none);
-}
-
-Descriptor open_log(const std::string& path) {
-  return Descriptor(::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600));
-}
-
-std::string text_of(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
-  return text;
-}
-
-Outcome<protocol::JobResult> result_of(const std::string& folder, const std::string& name,
-                                       const protocol::JobTerms& terms) {
-  const std::string path = folder + "/" + name;
-  std::error_code none;
-  const std::uint64_t bytes = std::filesystem::file_size(path, none);
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
-  Digest digest(Digest::Algorithm::kSha256);
-  const bool is_read =
-      !none && file.is_open() && read_pieces(file.get(), bytes, [&](std::span<const std::byte> piece) {
-        digest.add(piece);
-        return true;
-      });
-  if (!is_read)
-    return Problem{.kind = ProblemKind::kInternalError,
-                   .detail = "the worker says that it is done, but its result cannot be read"};
-  return protocol::JobResult{
-      .name = name,
-      .media_type = std::string(file_type(terms.format.value_or(CloudFormat::kPly)).media_type),
-      .bytes = bytes,
-      .sha256 = to_hex(digest.finish())};
-}
-
-/// The files of a worker's report, which then no longer says where they are.
-Outcome<std::vector<protocol::JobResult>> results_of(const std::string& folder, JsonDocument& report,
-                                                     const protocol::JobTerms& terms) {
-  std::vector<protocol::JobResult> results;
-  const JsonDocument files = report.value("files", JsonDocument::array());
-  report.erase("files");
-  for (const JsonDocument& file : files) {
-    const std::string name = std::filesystem::path(file.get<std::string>()).filename().string();
-    auto result = result_of(folder, name, terms);
-    if (!result.ok()) return result.problem();
-    results.push_back(std::move(result.value()));
-  }
-  return results;
 }
 
 }  // namespace
@@ -119,7 +63,7 @@ std::string JobQueue::result_path(const std::string& id, const std::string& name
 void JobQueue::note(const std::string& id, const std::string& text) const {
   const std::string line =
       protocol::to_rfc3339(std::chrono::system_clock::now()).append(" ").append(text).append("\n");
-  const Descriptor log = open_log(log_path(id));
+  const Descriptor log = open_job_log(log_path(id));
   if (log.is_open()) write_all(log.get(), std::as_bytes(std::span(line.data(), line.size())));
 }
 
@@ -154,17 +98,18 @@ std::optional<Problem> JobQueue::check_locked() const {
   if (stopping_) return Problem{.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"};
   if (entries_.size() < settings_.limits.max_jobs) return std::nullopt;
   return Problem{.kind = ProblemKind::kTooMany,
-                 .detail = "the server holds as many jobs as it may (max_jobs); delete some that have ended",
+                 .detail = "the server holds as many jobs as it may (max_jobs), and none has ended",
                  .limit = static_cast<double>(settings_.limits.max_jobs),
                  .actual = static_cast<double>(entries_.size() + 1)};
 }
 
-Outcome<std::vector<std::string>> JobQueue::command_of(const KeptJob& job, const std::string& folder) const {
-  const WorkerFiles files{.recipe = folder + "/" + kRecipeName,
-                          .input = folder + "/" + kInputName,
-                          .preview = job.has_preview ? folder + "/" + kPreviewName : "",
-                          .output = folder + "/" + job.result,
-                          .work = folder + "/work"};
+Outcome<std::vector<std::string>> JobQueue::command_of(const KeptJob& job) const {
+  // By names in its own folder: neither the log nor a problem says where that is.
+  const WorkerFiles files{.recipe = kRecipeName,
+                          .input = kInputName,
+                          .preview = job.has_preview ? kPreviewName : "",
+                          .output = job.result,
+                          .work = "work"};
   const std::vector<std::string> worker =
       worker_words(settings_.worker, job, files, settings_.limits, settings_.threads);
   if (job.document.terms.launcher == protocol::kLocalLauncher) return worker;
@@ -199,14 +144,12 @@ Outcome<JobDocument> JobQueue::submit(NewJob job, const Seal<JobDocument>& seal)
   document.message = "waits for its turn";
   document.progress = {.phase = "waiting", .fraction = 0.0};
   const std::string folder = folder_of(document.id);
-  if (auto command = command_of(job.job, folder); !command.ok()) return command.problem();
-  {
-    const std::lock_guard lock(mutex_);
-    if (auto problem = check_locked()) return *problem;
-  }
+  if (auto command = command_of(job.job); !command.ok()) return command.problem();
+  SharedEntry displaced;
   auto outcome = [&]() -> Outcome<JobDocument> {
     if (auto prepared = prepare(job, folder); !prepared.ok()) return prepared.problem();
     const std::lock_guard lock(mutex_);
+    displaced = make_room_locked();
     if (auto problem = check_locked()) return *problem;
     const auto entry = std::make_shared<Entry>();
     entry->kept = std::move(job.job);
@@ -223,27 +166,65 @@ Outcome<JobDocument> JobQueue::submit(NewJob job, const Seal<JobDocument>& seal)
     return seen;
   }();
   if (!outcome.ok()) remove_folder(folder);
+  if (displaced != nullptr) remove_folder(folder_of(displaced->kept.document.id));
   return outcome;
 }
 
+JobQueue::SharedEntry JobQueue::make_room_locked() {
+  if (stopping_ || entries_.size() < settings_.limits.max_jobs) return nullptr;
+  std::map<std::string, std::size_t> held;
+  for (const SharedEntry& entry : entries_) ++held[entry->kept.owner];
+  SharedEntry chosen;
+  const auto when = [](const Entry& entry) {
+    return entry.kept.document.finished.value_or(entry.kept.document.updated);
+  };
+  for (const SharedEntry& entry : entries_) {
+    if (!entry->kept.document.has_ended() || entry->has_worker) continue;
+    const std::size_t theirs = held[entry->kept.owner];
+    const std::size_t most = chosen == nullptr ? 0 : held[chosen->kept.owner];
+    if (chosen == nullptr || theirs > most || (theirs == most && when(*entry) < when(*chosen)))
+      chosen = entry;
+  }
+  if (chosen == nullptr || !archive_.remove(chosen->kept.document.id).ok()) return nullptr;
+  std::erase(entries_, chosen);
+  ++chosen->changes;
+  changed_.notify_all();
+  return chosen;
+}
+
 Outcome<JsonDocument> JobQueue::validate(NewJob job) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (stopping_ || validating_ >= settings_.limits.max_running_jobs)
+      return Problem{.kind = ProblemKind::kOverloaded,
+                     .detail = "as many jobs are being looked at as may run (max_running_jobs)",
+                     .limit = static_cast<double>(settings_.limits.max_running_jobs)};
+    ++validating_;
+  }
+  const std::shared_ptr<void> slot(nullptr, [this](void*) {
+    const std::lock_guard lock(mutex_);
+    --validating_;
+  });
   const std::string folder = folder_of("check-" + random_id());
   auto outcome = [&]() -> Outcome<JsonDocument> {
-    if (auto command = command_of(job.job, folder); !command.ok()) return command.problem();
+    if (auto command = command_of(job.job); !command.ok()) return command.problem();
     if (auto prepared = prepare(job, folder); !prepared.ok()) return prepared.problem();
     // Here, whatever the launcher: nothing is done but looking.
     KeptJob here = job.job;
     here.document.terms.launcher = protocol::kLocalLauncher;
-    auto command = command_of(here, folder);
+    auto command = command_of(here);
     if (!command.ok()) return command.problem();
     command.value().emplace_back("--dry-run");
-    const Descriptor log = open_log(folder + "/" + kLogName);
-    auto worker = WorkerProcess::start(command.value(), log.get(), folder + "/" + kPidName);
+    const Descriptor log = open_job_log(folder + "/" + kLogName);
+    auto worker = WorkerProcess::start(command.value(), folder, log.get(), folder + "/" + kWorkerPidName);
     if (!worker) return Problem{.kind = ProblemKind::kOverloaded, .detail = "no worker could be started"};
     const auto deadline = SteadyClock::now() + kValidationDeadline;
     std::string last;
     const ChildEnd end = worker->run([&](const std::string& line) { last = line; },
-                                     [&] { return SteadyClock::now() > deadline; });
+                                     [&] {
+                                       const std::lock_guard lock(mutex_);
+                                       return stopping_ || SteadyClock::now() > deadline;
+                                     });
     if (end.by_cancel)
       return Problem{.kind = ProblemKind::kTooManySamples,
                      .detail = "the scan could not be looked through in time",
@@ -357,22 +338,21 @@ std::optional<std::uint64_t> JobQueue::wait_beyond(const std::string& id, std::u
   }
 }
 
-std::vector<std::string> JobQueue::recover(
-    const std::function<std::shared_ptr<const void>(const std::string& owner)>& hold_quota) {
+std::vector<std::string> JobQueue::recover(const std::function<void(KeptJob&)>& hold) {
   std::size_t damaged = 0;
   std::vector<std::string> notes;
   std::vector<KeptJob> jobs = archive_.jobs(damaged);
   const std::lock_guard lock(mutex_);
   for (KeptJob& kept : jobs) {
-    end_left_worker(folder_of(kept.document.id) + "/" + kPidName);
+    end_left_worker(folder_of(kept.document.id) + "/" + kWorkerPidName);
     const auto entry = std::make_shared<Entry>();
+    hold(kept);
     entry->kept = std::move(kept);
     JobDocument& document = entry->kept.document;
     document.progress = {.phase = "waiting", .fraction = 0.0};
     if (document.has_ended()) {
       if (document.status == JobStatus::kSuccessful) document.progress = {.phase = "done", .fraction = 1.0};
     } else {
-      entry->kept.quota = hold_quota(entry->kept.owner);
       document.status = JobStatus::kAccepted;
       document.message = document.attempts > 0 ? "waits to go on where it was" : "waits for its turn";
     }
@@ -383,7 +363,7 @@ std::vector<std::string> JobQueue::recover(
   std::error_code none;
   for (const auto& folder : std::filesystem::directory_iterator(settings_.folder, none))
     if (damaged == 0 && find_locked(folder.path().filename().string()) == nullptr) {
-      end_left_worker(folder.path().string() + "/" + kPidName);
+      end_left_worker(folder.path().string() + "/" + kWorkerPidName);
       remove_folder(folder.path().string());
     }
   const bool has_work = std::any_of(entries_.begin(), entries_.end(),
@@ -480,90 +460,6 @@ void JobQueue::run() {
     ++entry->changes;
     changed_.notify_all();
   }
-}
-
-void JobQueue::run_job(const SharedEntry& entry) {
-  KeptJob job;
-  {
-    const std::lock_guard lock(mutex_);
-    job = entry->kept;
-  }
-  const std::string& id = job.document.id;
-  const auto command = command_of(job, folder_of(id));
-  if (!command.ok() || job.document.attempts > kMostAttempts) {
-    const Problem problem =
-        !command.ok()
-            ? command.problem()
-            : Problem{.kind = ProblemKind::kInternalError,
-                      .detail = "its worker was interrupted too often: restart the job to try again",
-                      .limit = static_cast<double>(kMostAttempts)};
-    return settle(entry, {.status = 1}, protocol::to_text({{"problem", to_json(problem)}}));
-  }
-  note(id, "attempt " + std::to_string(job.document.attempts) + ": " + text_of(command.value()));
-  const Descriptor log = open_log(log_path(id));
-  auto worker = WorkerProcess::start(command.value(), log.get(), folder_of(id) + "/" + kPidName);
-  if (!worker) {
-    const Problem problem{.kind = ProblemKind::kInternalError,
-                          .detail = "the worker could not be started: " + command.value().front()};
-    return settle(entry, {.status = 1}, protocol::to_text({{"problem", to_json(problem)}}));
-  }
-  std::string last;
-  const ChildEnd end = worker->run([&](const std::string& line) { take_line(entry, line, last); },
-                                   [&] {
-                                     const std::lock_guard lock(mutex_);
-                                     return stopping_ || entry->must_end;
-                                   });
-  settle(entry, end, last);
-}
-
-void JobQueue::take_line(const SharedEntry& entry, const std::string& line, std::string& last) {
-  const WorkerWord word = parse_worker_word(line);
-  if (!word.progress) {
-    last = line;
-    return;
-  }
-  const std::lock_guard lock(mutex_);
-  JobDocument& document = entry->kept.document;
-  if (document.status != JobStatus::kRunning) return;
-  if (word.progress->phase != document.progress.phase) note(document.id, word.progress->phase);
-  document.progress = *word.progress;
-  document.updated = std::chrono::system_clock::now();
-  ++entry->changes;
-  changed_.notify_all();
-}
-
-void JobQueue::settle(const SharedEntry& entry, const ChildEnd& end, const std::string& last) {
-  KeptJob job;
-  {
-    const std::lock_guard lock(mutex_);
-    job = entry->kept;
-  }
-  const std::string& id = job.document.id;
-  WorkerWord word = parse_worker_word(last);
-  std::optional<Problem> problem;
-  std::vector<protocol::JobResult> results;
-  if (word.report && end.signal == 0 && end.status == 0) {
-    auto made = results_of(folder_of(id), *word.report, job.document.terms);
-    if (made.ok())
-      results = std::move(made.value());
-    else
-      problem = made.problem();
-  } else {
-    problem = problem_of_worker(end, word);
-  }
-  const std::lock_guard lock(mutex_);
-  JobDocument& document = entry->kept.document;
-  // Dismissed meanwhile; or the daemon stops: the next one goes on.
-  if (document.status != JobStatus::kRunning || (stopping_ && end.by_cancel)) return;
-  document.finished = document.updated = std::chrono::system_clock::now();
-  document.status = problem ? JobStatus::kFailed : JobStatus::kSuccessful;
-  document.message = problem ? problem->detail : "is done";
-  document.problem = std::move(problem);
-  document.results = std::move(results);
-  if (word.report) document.report = *word.report;
-  if (document.status == JobStatus::kSuccessful) document.progress = {.phase = "done", .fraction = 1.0};
-  note(id, std::string(job_status_name(document.status)).append(": ").append(document.message));
-  keep_locked(*entry);
 }
 
 void JobQueue::keep_locked(Entry& entry) {

@@ -18,6 +18,7 @@
 #include "server/config/config.h"
 #include "server/ingest/child_process.h"
 #include "server/queue/job_archive.h"
+#include "server/store/upload_store.h"
 
 namespace pointwright::server {
 
@@ -45,13 +46,14 @@ class JobQueue {
     std::function<Outcome<Done>(const std::string& folder)> fill;
   };
   static constexpr const char* kRecipeName = "recipe.json";
-  static constexpr const char* kInputName = "input";
+  static constexpr const char* kInputName = kJobInputName;
   static constexpr const char* kPreviewName = "preview.ply";
 
   /// Problems: too many, invalid value (a launcher that there is not), those of fill() and of the archive
   Outcome<protocol::JobDocument> submit(NewJob job, const Seal<protocol::JobDocument>& seal = {});
   /// What the job would take, by its worker: {"mode", "sample_count", …}. Nothing is kept.
-  /// Problems: besides, the worker's; too large where it takes longer than kValidationDeadline
+  /// As many at once as jobs run. Problems: besides, overloaded; the worker's; too many samples where that
+  /// takes longer than kValidationDeadline
   Outcome<protocol::JsonDocument> validate(NewJob job);
   [[nodiscard]] std::optional<protocol::JobDocument> find(const std::string& id) const;
   [[nodiscard]] std::optional<std::string> owner_of(const std::string& id) const;
@@ -72,9 +74,8 @@ class JobQueue {
   [[nodiscard]] std::string result_path(const std::string& id, const std::string& name) const;
 
   /// Knows the jobs of the process before: those that ran go on. Ends what it has left running. Notes are for
-  /// the log. Throws DatabaseError.
-  std::vector<std::string> recover(
-      const std::function<std::shared_ptr<const void>(const std::string& owner)>& hold_quota);
+  /// the log. `hold` takes the parts of quotas that a job has. Throws DatabaseError.
+  std::vector<std::string> recover(const std::function<void(KeptJob&)>& hold);
   /// Ends all workers; their jobs go on with the next process.
   void stop();
 
@@ -92,8 +93,7 @@ class JobQueue {
   [[nodiscard]] protocol::JobDocument seen_locked(const Entry& entry) const;
   [[nodiscard]] std::optional<protocol::Problem> check_locked() const;
   [[nodiscard]] std::string folder_of(const std::string& id) const;
-  [[nodiscard]] Outcome<std::vector<std::string>> command_of(const KeptJob& job,
-                                                             const std::string& folder) const;
+  [[nodiscard]] Outcome<std::vector<std::string>> command_of(const KeptJob& job) const;
   Outcome<Done> prepare(const NewJob& job, const std::string& folder) const;
   void start_runners_locked();
   void run();
@@ -104,6 +104,8 @@ class JobQueue {
   void keep_locked(Entry& entry);
   void note(const std::string& id, const std::string& text) const;
   [[nodiscard]] SharedEntry take_expired_locked();
+  /// Where there are as many as may be: the job that ended longest ago, of whoever holds most; taken out.
+  [[nodiscard]] SharedEntry make_room_locked();
 
   const JobSettings settings_;
   JobArchive archive_;
@@ -111,6 +113,7 @@ class JobQueue {
   mutable std::mutex mutex_;  // guards what follows, and the entries
   std::condition_variable changed_;
   bool stopping_ = false;
+  std::size_t validating_ = 0;
   std::vector<SharedEntry> entries_;  // oldest first
   std::vector<std::thread> runners_;
 };

@@ -66,7 +66,8 @@ class Lines {
 
 }  // namespace
 
-std::optional<WorkerProcess> WorkerProcess::start(const std::vector<std::string>& command, int log,
+std::optional<WorkerProcess> WorkerProcess::start(const std::vector<std::string>& command,
+                                                  const std::string& folder, int log,
                                                   const std::string& pid_file) {
   std::array<int, 2> ends{-1, -1};
   if (command.empty() || ::pipe2(ends.data(), O_CLOEXEC) != 0) return std::nullopt;
@@ -76,6 +77,7 @@ std::optional<WorkerProcess> WorkerProcess::start(const std::vector<std::string>
                                   .arguments = command,
                                   .output = theirs.get(),
                                   .errors = log,
+                                  .folder = folder,
                                   .leads_group = true,
                                   .inherits_environment = true});
   if (!child) return std::nullopt;
@@ -118,6 +120,10 @@ ChildEnd WorkerProcess::run(const std::function<void(const std::string&)>& take,
   if (WIFSIGNALED(status)) end.signal = WTERMSIG(status);
   if (WIFEXITED(status)) end.status = WEXITSTATUS(status);
   return end;
+}
+
+Descriptor open_job_log(const std::string& path) {
+  return Descriptor(::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600));
 }
 
 void end_left_worker(const std::string& pid_file) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <utility>
 
 #include "server/base/random_id.h"
@@ -23,6 +24,7 @@ bool has_ended(const ImportDocument& import) {
 
 ImportStore::ImportStore(const Limits& limits, std::function<void(const std::string&)> report_failure)
     : max_imports_(limits.max_imports),
+      token_imports_(limits.token_imports),
       pool_(static_cast<std::size_t>(limits.max_decoders), 1, std::move(report_failure)) {}
 
 ImportStore::~ImportStore() {
@@ -49,24 +51,46 @@ Outcome<ImportDocument> ImportStore::start(NewImport import, Work work) {
                      .created = std::chrono::system_clock::now(),
                      .progress = {.phase = "waiting", .fraction = 0.0}};
   entry->owner = std::move(import.owner);
+  entry->key = std::move(import.key);
   entry->work = std::move(work);
   ImportDocument begun = entry->document;
   {
     const std::lock_guard lock(mutex_);
+    const auto under_way = std::count_if(entries_.begin(), entries_.end(), [&](const auto& each) {
+      return each->owner == entry->owner && !has_ended(each->document);
+    });
+    if (!entry->owner.empty() && static_cast<std::uint64_t>(under_way) >= token_imports_)
+      return Problem{.kind = ProblemKind::kTooMany,
+                     .detail = "as many imports of the token are under way as may be (token_imports)",
+                     .limit = static_cast<double>(token_imports_),
+                     .actual = static_cast<double>(under_way + 1)};
     if (entries_.size() >= max_imports_) {
-      const auto ended = std::find_if(entries_.begin(), entries_.end(),
-                                      [](const auto& each) { return has_ended(each->document); });
-      if (ended == entries_.end())
+      const auto displaced = displaced_locked();
+      if (displaced == nullptr)
         return Problem{.kind = ProblemKind::kTooMany,
-                       .detail = "as many imports are under way as may be",
+                       .detail = "as many imports are under way as may be (max_imports)",
                        .limit = static_cast<double>(max_imports_),
-                       .actual = static_cast<double>(entries_.size())};
-      entries_.erase(ended);
+                       .actual = static_cast<double>(entries_.size() + 1)};
+      std::erase(entries_, displaced);
     }
     entries_.push_back(entry);
   }
   pool_.post([this, entry] { run(entry); });
   return begun;
+}
+
+std::shared_ptr<ImportStore::Entry> ImportStore::displaced_locked() const {
+  std::map<std::string, std::size_t> held;
+  for (const auto& entry : entries_) ++held[entry->owner];
+  std::shared_ptr<Entry> chosen;
+  for (const auto& entry : entries_) {
+    if (!has_ended(entry->document)) continue;
+    const std::size_t theirs = held[entry->owner];
+    const std::size_t most = chosen == nullptr ? 0 : held[chosen->owner];
+    if (chosen == nullptr || theirs > most || (theirs == most && entry->ended < chosen->ended))
+      chosen = entry;
+  }
+  return chosen;
 }
 
 void ImportStore::run(const std::shared_ptr<Entry>& entry) {
@@ -84,6 +108,7 @@ void ImportStore::run(const std::shared_ptr<Entry>& entry) {
     ImportDocument& document = entry->document;
     document.state = cloud.ok() ? ImportState::kSuccessful : ImportState::kFailed;
     document.progress = entry->context.progress();
+    entry->ended = std::chrono::steady_clock::now();
     if (cloud.ok()) {
       document.cloud = cloud.value()->document;
       document.progress = {.phase = "ready", .fraction = 1.0};
@@ -110,6 +135,13 @@ std::optional<ImportDocument> ImportStore::find(const std::string& id) const {
   const auto entry = find_locked(id);
   if (entry == nullptr) return std::nullopt;
   return seen(*entry);
+}
+
+std::optional<ImportDocument> ImportStore::find_key(const std::string& owner, const std::string& key) const {
+  const std::lock_guard lock(mutex_);
+  for (const auto& entry : entries_)
+    if (!key.empty() && entry->key == key && entry->owner == owner) return seen(*entry);
+  return std::nullopt;
 }
 
 std::optional<std::string> ImportStore::owner_of(const std::string& id) const {

@@ -1,6 +1,7 @@
 #pragma once
 // Imports that their clients do not wait for: they are asked how far they are, and can be ended.
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -32,12 +33,18 @@ class ImportStore {
     std::string name;
     std::uint64_t bytes = 0;
     std::string owner;
+    /// Of the request, where it may come again: it then gets the import that it has begun. Empty: none.
+    std::string key = {};
   };
   /// Stores the cloud, or says why not. Told when to end by the context, which it tells how far it is.
   using Work = std::function<Outcome<SharedCloud>(const ExecutionContext&)>;
-  /// Problem: too many, none of which has ended
+  /// Where there are as many as may be, one that has ended makes room: of whoever holds most, the one that
+  /// ended longest ago. Problem: too many, of the owner (token_imports) or of all, none of which has ended
   Outcome<protocol::ImportDocument> start(NewImport import, Work work);
   [[nodiscard]] std::optional<protocol::ImportDocument> find(const std::string& id) const;
+  /// The one that the owner's request with this key has begun.
+  [[nodiscard]] std::optional<protocol::ImportDocument> find_key(const std::string& owner,
+                                                                 const std::string& key) const;
   [[nodiscard]] std::optional<std::string> owner_of(const std::string& id) const;
   /// Of the owners that may be seen, oldest first.
   [[nodiscard]] std::vector<protocol::ImportDocument> list(
@@ -52,6 +59,8 @@ class ImportStore {
   struct Entry {
     protocol::ImportDocument document;  // guarded by the store's mutex
     std::string owner;
+    std::string key;
+    std::chrono::steady_clock::time_point ended{};
     ExecutionContext context;
     Work work;
   };
@@ -59,7 +68,10 @@ class ImportStore {
   [[nodiscard]] std::shared_ptr<Entry> find_locked(const std::string& id) const;
   [[nodiscard]] static protocol::ImportDocument seen(const Entry& entry);
 
+  [[nodiscard]] std::shared_ptr<Entry> displaced_locked() const;
+
   const std::uint64_t max_imports_;
+  const std::uint64_t token_imports_;
   mutable std::mutex mutex_;  // guards what follows
   std::vector<std::shared_ptr<Entry>> entries_;
   ComputePool pool_;  // its threads use all of the above

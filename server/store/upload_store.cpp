@@ -80,9 +80,15 @@ struct UploadStore::Entry {
 
 // ---- the store ----
 
-UploadStore::UploadStore(const Limits& limits, std::string folder)
+UploadStore::UploadStore(const Limits& limits, std::string folder, std::string jobs)
     : limits_(limits), folder_(std::move(folder)) {
+  std::error_code none;
+  for (const auto& job : std::filesystem::directory_iterator(jobs, none)) {
+    struct stat info {};
+    if (::lstat((job.path() / kJobInputName).c_str(), &info) == 0) ++job_links_[info.st_ino];
+  }
   load();
+  job_links_.clear();
   sweep();
   sweeper_ = std::thread([this] { sweep_until_stopped(); });
 }
@@ -120,7 +126,9 @@ bool UploadStore::load_one(const std::string& id) {
     offset = std::min<std::uint64_t>(offset, std::strtoull(text.c_str(), nullptr, 10));
   }
   offset = std::min(offset, record->length);
-  if (info.st_nlink > 1) return false;  // it was imported: its bytes are a cloud's, and stay
+  const auto jobs = job_links_.find(info.st_ino);
+  const nlink_t known = 1 + (jobs == job_links_.end() ? 0 : jobs->second);
+  if (info.st_nlink > known) return false;  // it was imported: its bytes are a cloud's, and stay
   if (::ftruncate(file.get(), static_cast<off_t>(offset)) != 0) return false;
   // What the last process wrote may not have reached the disk; only then may it be told.
   if (::fdatasync(file.get()) != 0) return false;

@@ -1,6 +1,8 @@
 #pragma once
 // Resumable uploads: bytes on disk, never in memory, that survive the client's connection and the daemon.
 
+#include <sys/types.h>
+
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -29,6 +31,9 @@ struct UploadStatus {
   std::chrono::system_clock::time_point expires;
 };
 
+/// The name that a job's folder has for what the job reads: a link to an upload, or to a cloud's file.
+inline constexpr const char* kJobInputName = "input";
+
 /// What Upload-Checksum names: the algorithm, and the digest in bytes.
 struct UploadChecksum {
   Digest::Algorithm algorithm = Digest::Algorithm::kSha256;
@@ -41,7 +46,8 @@ class UploadStore {
 
  public:
   /// Removes what is expired or damaged, now and from time to time.
-  UploadStore(const Limits& limits, std::string folder);
+  /// `jobs`: a folder whose folders may have links to uploads; empty: there is none
+  UploadStore(const Limits& limits, std::string folder, std::string jobs = {});
   ~UploadStore();
   UploadStore(const UploadStore&) = delete;
   UploadStore& operator=(const UploadStore&) = delete;
@@ -121,7 +127,8 @@ class UploadStore {
 
   const Limits limits_;
   const std::string folder_;
-  mutable std::mutex mutex_;  // guards all below and the entries
+  std::map<ino_t, nlink_t> job_links_;  // of uploads that jobs read, while they are loaded
+  mutable std::mutex mutex_;            // guards all below and the entries
   std::condition_variable stopping_changed_;
   bool stopping_ = false;
   std::map<std::string, std::shared_ptr<Entry>> entries_;

@@ -156,3 +156,34 @@ TEST_CASE("a daemon that stops ends its imports in time") {
   REQUIRE(post(daemon, text, "text/plain").status == 202);
   CHECK(daemon.stop(SIGTERM, std::chrono::seconds(10)) == 0);
 }
+
+TEST_CASE("an import that a request with a key has begun is begun once; a crash leaves the key free") {
+  const TemporaryFolder folder;
+  const std::vector<std::string> arguments = {"--data", folder / "data"};
+  const std::string headers =
+      "Content-Type: application/x-ply\r\nPrefer: respond-async\r\nIdempotency-Key: once\r\n";
+  const std::string file = file_of(wavy_sheet(60));
+  {
+    Daemon daemon(arguments);
+    const Reply first = daemon.ask("POST", "/v1/clouds", file, headers);
+    REQUIRE(first.status == 202);
+    const Reply same = daemon.ask("POST", "/v1/clouds", file, headers);
+    CHECK(same.status == 202);
+    CHECK(same.json()["id"] == first.json()["id"]);
+    daemon.stop(SIGKILL);
+  }
+  Daemon daemon(arguments);
+  const Reply again = daemon.ask("POST", "/v1/clouds", file, headers);
+  REQUIRE_MESSAGE(again.status == 202, again.body);
+  CHECK(ended(daemon, again.headers.at("location"))["state"] == "successful");
+}
+
+TEST_CASE("a token has its share of imports, and what ended makes room where most is held") {
+  Daemon daemon({"--max-imports", "3"});
+  for (int i = 0; i < 5; ++i)
+    CHECK(ended(daemon, daemon
+                            .ask("POST", "/v1/clouds", "no cloud",
+                                 "Content-Type: application/x-ply\r\nPrefer: respond-async\r\n")
+                            .headers.at("location"))["state"] == "failed");
+  CHECK(daemon.get("/v1/imports").json()["imports"].size() == 3);
+}

@@ -117,3 +117,62 @@ TEST_CASE("a job that is killed at any moments and started again gives the bytes
   CHECK(bytes_of(out) == expected);
   CHECK_FALSE(std::filesystem::exists(out + ".job"));
 }
+
+#ifdef POINTWRIGHT_MPIEXEC
+TEST_CASE("one process or several under mpirun give the same bytes, and go on with each other's work") {
+  const TemporaryFolder folder;
+  const std::string in = folder / "in.ply";
+  put_sheet(in, 300);
+  std::ofstream(folder / "recipe.json") << kRecipe;
+  const auto command = [&](int ranks, const std::string& output, std::vector<std::string> more = {}) {
+    std::vector<std::string> words;
+    if (ranks > 0)
+      words = {POINTWRIGHT_MPIEXEC, "--allow-run-as-root", "--oversubscribe", "-n", std::to_string(ranks)};
+    words.insert(words.end(), {POINTWRIGHT_PATH, "job", "run", "--recipe", folder / "recipe.json", "--in", in,
+                               "--out", output, "--memory", "64", "--preview-count", "2500", "--json"});
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  const Ended alone = run(command(0, folder / "alone.ply"));
+  REQUIRE_MESSAGE(alone.status == 0, alone.err);
+  const std::string expected = bytes_of(folder / "alone.ply");
+  const auto told = nlohmann::json::parse(alone.out);
+  for (const int ranks : {1, 2, 4}) {
+    CAPTURE(ranks);
+    const std::string out = folder / ("by" + std::to_string(ranks) + ".ply");
+    const Ended ended = run(command(ranks, out, {"--threads", "1"}));
+    REQUIRE_MESSAGE(ended.status == 0, ended.err);
+    CHECK(bytes_of(out) == expected);
+    CHECK_FALSE(std::filesystem::exists(out + ".job"));
+    const auto report = nlohmann::json::parse(ended.out);  // one report, whoever worked
+    CHECK(report["moved"] == told["moved"]);
+    CHECK(report["preview"] == told["preview"]);
+  }
+  const Ended in_memory = run(command(2, folder / "memory.ply", {"--mode", "memory"}));
+  REQUIRE_MESSAGE(in_memory.status == 0, in_memory.err);
+  CHECK(bytes_of(folder / "memory.ply") == expected);
+
+  // Two begin, one ends it.
+  const std::string out = folder / "cut.ply";
+  const pid_t two = start(command(2, out));
+  for (int i = 0; i < 3000 && !std::filesystem::exists(out + ".job/job.id"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  std::this_thread::sleep_for(std::chrono::milliseconds(30));
+  ::kill(two, SIGTERM);  // which mpirun hands on
+  int status = 0;
+  REQUIRE(::waitpid(two, &status, 0) == two);
+  const Ended rest = run(command(0, out));
+  REQUIRE_MESSAGE(rest.status == 0, rest.err);
+  CHECK(bytes_of(out) == expected);
+
+  // What is wrong is said once, and nobody waits for the others.
+  std::ofstream(folder / "torn.ply") << bytes_of(in).substr(0, 4000);
+  auto torn = command(2, folder / "none.ply");
+  for (std::string& word : torn)
+    if (word == in) word = folder / "torn.ply";
+  const Ended refused = run(torn);
+  CHECK(refused.status != 0);
+  CHECK(refused.err.find("pointwright: ") != std::string::npos);
+  CHECK_FALSE(std::filesystem::exists(folder / "none.ply"));
+}
+#endif

@@ -2,11 +2,13 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <thread>
 
 #include "tests/acceptance/bodies.h"
@@ -158,7 +160,8 @@ TEST_CASE("a session's edits are made on the whole of its cloud, with the report
   CHECK(moved == report["moved"]);
 
   const std::string log = daemon.get(path_of(job) + "/log").body;
-  CHECK(log.find("attempt 1: ") != std::string::npos);
+  CHECK(log.find("attempt 1, launcher local") != std::string::npos);
+  CHECK(log.find(folder / "data") == std::string::npos);
   CHECK(log.find("successful") != std::string::npos);
   CHECK(daemon.get(path_of(job) + "/log?offset=" + std::to_string(log.size())).body.empty());
   CHECK(daemon.get(path_of(job) + "/log?offset=10").body == log.substr(10));
@@ -328,7 +331,7 @@ TEST_CASE("a worker that dies fails its job with a plain reason, and nothing els
   const json gone = failed({{"launcher", "gone"}});
   CHECK(gone["message"].get<std::string>().find("status 7") != std::string::npos);
   CHECK(daemon.get(path_of(gone) + "/log").body.find("words for the log") != std::string::npos);
-  CHECK(failed({{"launcher", "nothing"}})["message"].get<std::string>().find("/nonexistent/program") !=
+  CHECK(failed({{"launcher", "nothing"}})["message"].get<std::string>().find("launcher nothing") !=
         std::string::npos);
   CHECK(daemon.is_alive());
   // Not a cloud at all: the worker says so itself.
@@ -407,4 +410,94 @@ TEST_CASE("a job that cannot be is refused with what is wrong; as many as may be
   held.let_go();
   // What has ended goes by itself.
   CHECK(becomes([&] { return daemon.get("/v1/jobs").json()["jobs"].empty(); }, std::chrono::seconds(30)));
+}
+
+TEST_CASE("an upload that a job reads is there after a restart, and a job has it though the upload goes") {
+  const TemporaryFolder folder;
+  const Held held;
+  const std::vector<std::string> arguments = held.arguments({"--data", folder / "data"});
+  std::string upload;
+  json job;
+  {
+    Daemon daemon(arguments);
+    const Lifted lifted(daemon);
+    upload = resumable(daemon, lifted.file);
+    job = submit(daemon, {{"session", lifted.session}, {"upload", upload}, {"launcher", "held"}});
+    daemon.stop(SIGKILL);
+  }
+  Daemon daemon(arguments);
+  const std::string tus = "Tus-Resumable: 1.0.0\r\n";
+  CHECK(daemon.ask("HEAD", "/v1/uploads/" + upload, "", tus).status == 200);
+  CHECK(daemon.ask("DELETE", "/v1/uploads/" + upload, "", tus).status == 204);
+  held.let_go();
+  CHECK(done(daemon, job)["report"]["sample_count"] == 10000);
+}
+
+TEST_CASE("as many jobs are looked at as may run; ended ones make room for new ones") {
+  const Held held;
+  Daemon daemon(held.arguments({"--max-jobs", "2"}));
+  const Lifted lifted(daemon);
+  const json body = {{"session", lifted.session}};
+  const json first = done(daemon, submit(daemon, body));
+  const json second = done(daemon, submit(daemon, body));
+  const json third = done(daemon, submit(daemon, body));
+  CHECK(daemon.get(path_of(first)).status == 404);
+  CHECK(daemon.get(path_of(second)).status == 200);
+  CHECK(daemon.get("/v1/jobs").json()["jobs"].size() == 2);
+  json check = body;
+  check["validate"] = true;
+  std::vector<int> statuses(6);
+  std::vector<std::thread> askers;
+  for (int& status : statuses)
+    askers.emplace_back([&] { status = daemon.ask("POST", "/v1/jobs", check.dump()).status; });
+  for (std::thread& asker : askers) asker.join();
+  CHECK(std::count(statuses.begin(), statuses.end(), 200) >= 1);
+  CHECK(std::count(statuses.begin(), statuses.end(), 200) +
+            std::count(statuses.begin(), statuses.end(), 503) ==
+        6);
+}
+
+TEST_CASE("launchers of Slurm start workers, and a dismissed job is cancelled there") {
+  // Stand-ins for Slurm's commands: they record what they are asked for, and one node does the work here.
+  const TemporaryFolder folder;
+  const auto program = [&](const std::string& name, const std::string& text) {
+    const std::string path = folder / name;
+    std::ofstream(path) << "#!/bin/sh\necho \"" << name << " $*\" >>" << (folder / "asked") << "\n" << text;
+    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+  };
+  program("srun", "while [ \"${1#-}\" != \"$1\" ]; do shift 2; done\n[ -e " + (folder / "wait") +
+                      " ] && exec sleep 60\nexec \"$@\"\n");
+  program("sbatch",
+          "for a in \"$@\"; do case $a in --output=*) o=${a#*=};; esac; done\nsh worker.sh >\"$o\" 2>>log &\n"
+          "echo $! >" +
+              (folder / "pid") + "\necho \"7;cluster\"\n");
+  program("squeue", "kill -0 $(cat " + (folder / "pid") + ") 2>/dev/null && echo 7\nexit 0\n");
+  program("scancel", "pkill -P $(cat " + (folder / "pid") + "); kill $(cat " + (folder / "pid") + ")\n");
+  const std::string path = "env PATH=" + (folder / "") + ":/usr/bin:/bin ";
+  Daemon daemon({"--launcher", "slurm=" + path + "srun -n 2 {worker}", "--launcher",
+                 "batch=" + path + POINTWRIGHT_LAUNCHERS "/slurm-batch.sh --ntasks 2 -- {worker}"});
+  const Lifted lifted(daemon);
+  const json plain = done(daemon, submit(daemon, {{"session", lifted.session}}));
+  const std::string expected = daemon.get(path_of(plain) + "/results/result.ply").body;
+  for (const char* const launcher : {"slurm", "batch"}) {
+    CAPTURE(launcher);
+    const json job = done(daemon, submit(daemon, {{"session", lifted.session}, {"launcher", launcher}}));
+    CHECK(daemon.get(path_of(job) + "/results/result.ply").body == expected);
+  }
+  std::ofstream(folder / "wait") << "";
+  const json held = submit(daemon, {{"session", lifted.session}, {"launcher", "batch"}});
+  const auto asked = [&] {
+    std::ifstream file(folder / "asked");
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const auto count = [&](const std::string& text) {
+    std::size_t times = 0;
+    const std::string all = asked();
+    for (std::size_t at = all.find(text); at != std::string::npos; at = all.find(text, at + 1)) ++times;
+    return times;
+  };
+  REQUIRE(becomes([&] { return count("sbatch --parsable --ntasks 2 ") == 2 && count("srun ") == 3; }));
+  CHECK(daemon.ask("DELETE", path_of(held)).status == 200);
+  CHECK(becomes([&] { return count("scancel 7") == 1; }, std::chrono::seconds(5)));
+  CHECK(asked().find("srun -n 2 ") != std::string::npos);
 }

@@ -1,15 +1,20 @@
 // Jobs: a recipe on scan files, in tiles and otherwise.
 #include <doctest/doctest.h>
+#include <fcntl.h>
+#include <sys/file.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
 
 #include "engine/core/parallel.h"
 #include "engine/io/cloud_io.h"
 #include "protocol/json/parse.h"
+#include "server/base/descriptor.h"
 #include "server/ingest/files.h"
 #include "server/jobs/full_resolution.h"
 #include "tests/server/synthetic.h"
@@ -294,6 +299,57 @@ TEST_CASE("tiles of another recipe or another input are not taken for this job's
   JobParams other = params;
   other.request = lifting(1);
   CHECK(job.run(other).tiles_kept == 0);
+
+  // A single sample that is another one makes it another input.
+  const auto interrupt = [&] {
+    const ExecutionContext context2;
+    REQUIRE_FALSE(run_full_resolution(params, context2, [&](const std::string& phase, double) {
+                    if (phase == "result") context2.cancel();
+                  }).ok());
+  };
+  interrupt();
+  Cloud changed = wavy_sheet(150);
+  changed.position.set(150 * 75 + 70, changed.position[150 * 75 + 70] + Vec3f(0.0F, 0.0F, 1e-4F));
+  put(job.in, changed);
+  CHECK(job.run(params).tiles_kept == 0);
+  const std::string expected = bytes_of(job.out);
+  // Theirs, ours half sorted, and theirs again.
+  interrupt();
+  put(job.in, wavy_sheet(150));
+  const ExecutionContext sorting;
+  REQUIRE_FALSE(run_full_resolution(params, sorting, [&](const std::string& phase, double) {
+                  if (phase == "tiles") sorting.cancel();
+                }).ok());
+  put(job.in, changed);
+  job.run(params);
+  CHECK(bytes_of(job.out) == expected);
+}
+
+TEST_CASE("a job has its folder to itself, and leaves in it what is not its own") {
+  const JobFolder job;
+  put(job.in, wavy_sheet(100));
+  JobParams params = job.params();
+  std::filesystem::create_directory(params.folder);
+  put(params.folder + "/mine.result", "mine");
+  put(params.folder + "/tile-notes.txt", "mine");
+  {
+    const Descriptor other(::open(params.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    REQUIRE(::flock(other.get(), LOCK_EX | LOCK_NB) == 0);
+    CHECK(job.refused(params).kind == ProblemKind::kWrongState);
+  }
+  params.input = params.folder + "/in.ply";
+  params.output = params.folder + "/out.ply";
+  put(params.input, wavy_sheet(100));
+  const auto report = run_full_resolution(params, ExecutionContext(), [](const std::string&, double) {});
+  REQUIRE(report.ok());
+  std::set<std::string> left;
+  for (const auto& entry : std::filesystem::directory_iterator(params.folder))
+    left.insert(entry.path().filename().string());
+  CHECK(left == std::set<std::string>{"in.ply", "mine.result", "out.ply", "tile-notes.txt"});
+  params.output = params.folder;
+  CHECK_FALSE(run_full_resolution(params, ExecutionContext(), [](const std::string&, double) {}).ok());
+  params.output = job.folder / "none/out.ply";
+  CHECK(job.refused(params).kind == ProblemKind::kInvalidValue);
 }
 
 TEST_CASE("an animation's clouds are those of plain jobs, the first one the input to the bit") {
@@ -387,6 +443,20 @@ TEST_CASE("LAS stays on its grid, and what its numbers cannot say is refused") {
   REQUIRE(after.size() == before.size());
   for (std::size_t i = 0; i < before.size(); ++i)
     if (before.position[i].x() < 0.25F) CHECK(model_position(after, i) == model_position(before, i));
+  // The header says how far they reach now: greatest and least x, y and z.
+  Vec3d least = model_position(after, 0);
+  Vec3d greatest = least;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    least = least.cwiseMin(model_position(after, i));
+    greatest = greatest.cwiseMax(model_position(after, i));
+  }
+  const std::string header = bytes_of(params.output).substr(179, 48);
+  std::array<double, 6> bounds{};
+  std::memcpy(bounds.data(), header.data(), sizeof bounds);
+  for (int axis = 0; axis < 3; ++axis) {
+    CHECK(bounds.at(static_cast<std::size_t>(2 * axis)) == doctest::Approx(greatest[axis]).epsilon(1e-9));
+    CHECK(bounds.at(static_cast<std::size_t>(2 * axis + 1)) == doctest::Approx(least[axis]).epsilon(1e-9));
+  }
   std::filesystem::remove(params.output);
   params.request.recipe.edits[0].edit.deformation.steps = {Translation{.vector = {0.0, 0.0, 1e8}}};
   params.request.recipe.edits.resize(1);

@@ -1,0 +1,25 @@
+// `pointwright` under mpirun or srun: the same commands, with a team for `job run`. The program itself goes
+// over into this one where it finds that MPI has started it.
+
+#include <exception>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "server/cli/commands.h"
+#include "server/ingest/confined.h"
+#include "server/jobs/mpi_team.h"
+
+int main(int argc, char** argv) {
+  // Decoders are no part of the team.
+  if (argc > 1 && std::string(argv[1]) == pointwright::kDecodeChildArgument)
+    return pointwright::decode_child_main();
+  try {
+    const auto team = pointwright::server::mpi_team(argc, argv);
+    std::vector<std::string> arguments(argv + 1, argv + argc);
+    return pointwright::server::run_command(arguments, std::cout, std::cerr, team.get());
+  } catch (const std::exception& error) {
+    std::cerr << "pointwright: " << error.what() << "\n";
+    return 1;
+  }
+}
