@@ -113,7 +113,7 @@ class ChunkSink final : public BodySink {
   bool write(std::span<const std::byte> bytes) override {
     return bytes.empty() || exchange_.write_chunk(bytes);
   }
-  [[nodiscard]] bool is_peer_gone() override { return exchange_.is_peer_gone(); }
+  [[nodiscard]] bool is_peer_gone() override { return exchange_.is_reader_gone(); }
   [[nodiscard]] bool is_stopping() const override { return exchange_.is_stopping(); }
 
  private:

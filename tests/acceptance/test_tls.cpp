@@ -122,15 +122,20 @@ TEST_CASE("a stream whose reader ends TLS or its connection is noticed") {
     const std::size_t at = metrics.body.find("\npointwright_streams ");
     return at == std::string::npos ? -1 : std::stoi(metrics.body.substr(at + 21));
   };
-  for (const bool says_so : {true, false}) {
+  enum class Leave { kEndsTls, kSpeaksAndEndsTls, kCloses, kGoesOnSending };
+  for (const Leave leave :
+       {Leave::kEndsTls, Leave::kSpeaksAndEndsTls, Leave::kCloses, Leave::kGoesOnSending}) {
+    CAPTURE(static_cast<int>(leave));
     auto stream = std::make_unique<TlsClient>(tls.daemon->port(), tls.certificate);
     stream->send("GET " + session + "/stream HTTP/1.1\r\nHost: localhost\r\n\r\n");
     std::string streamed;
     while (streamed.find("PWFR") == std::string::npos) REQUIRE(stream->receive_some(streamed));
     CHECK(is_within(std::chrono::seconds(5), [&] { return streams() == 1; }));
+    if (leave == Leave::kSpeaksAndEndsTls) stream->send(std::string(5000, 'x'));
     // The end of TLS alone leaves the connection as it is.
-    if (says_so) SSL_shutdown(stream->ssl());
-    if (!says_so) stream.reset();
+    if (leave == Leave::kEndsTls || leave == Leave::kSpeaksAndEndsTls) SSL_shutdown(stream->ssl());
+    if (leave == Leave::kCloses) stream.reset();
+    if (leave == Leave::kGoesOnSending) stream->send(std::string(100'000, 'x'));
     CHECK(is_within(std::chrono::seconds(10), [&] { return streams() == 0; }));
   }
 }

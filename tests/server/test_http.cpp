@@ -364,6 +364,19 @@ TEST_CASE("a stream ends soon after its client is gone") {
   CHECK(comes_true([&] { return server.open_streams == 0; }, std::chrono::milliseconds(2000)));
 }
 
+TEST_CASE("a stream whose client goes on sending ends") {
+  TestServer server;
+  RawClient client(server.port());
+  client.send(get("/stream"));
+  REQUIRE(comes_true([&] { return server.open_streams == 1; }));
+  client.send("a little is dropped");
+  std::string text;
+  for (int i = 0; i < 20; ++i) REQUIRE(client.receive_some(text, std::chrono::seconds(10)));
+  CHECK(server.open_streams == 1);
+  client.send(std::string(64 * 1024, 'x'));
+  CHECK(comes_true([&] { return server.open_streams == 0; }));
+}
+
 TEST_CASE("a stream whose client does not read is dropped at its deadline") {
   HttpOptions options;
   options.stream_write_deadline = std::chrono::milliseconds(300);
