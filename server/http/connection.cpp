@@ -20,6 +20,7 @@ namespace pointwright::server {
 namespace {
 
 constexpr std::size_t kLingerDropBytes = 256 * 1024;
+constexpr std::size_t kUnaskedBytes = 16 * 1024;
 constexpr std::size_t kReadBytes = 64 * 1024;
 constexpr std::size_t kPieceBytes = 256 * 1024;
 constexpr std::uint64_t kHoldBytes = 4U << 20U;
@@ -195,6 +196,18 @@ std::string Connection::peer_address() const {
 
 bool Connection::is_peer_gone() const {
   return broken_ || transport_->is_peer_gone();
+}
+
+bool Connection::is_reader_gone() {
+  std::array<char, 4096> chunk;
+  while (!broken_ && unasked_ <= kUnaskedBytes) {
+    const Moved moved = transport_->read(chunk);
+    if (moved.status == Moved::Status::kEnded) return true;
+    if (moved.status == Moved::Status::kBroken) broken_ = true;
+    if (moved.status != Moved::Status::kDone) return is_peer_gone();
+    unasked_ += moved.count;
+  }
+  return true;
 }
 
 void Connection::linger(std::chrono::milliseconds patience) {

@@ -61,6 +61,9 @@ class Connection {
   [[nodiscard]] bool is_broken() const { return broken_; }
   /// Whether the peer has closed or reset its side. Never blocks.
   [[nodiscard]] bool is_peer_gone() const;
+  /// The same for the reader of a stream, also where bytes came before its end: what it sends is dropped, and
+  /// who sends more than some KiB counts as gone. Never blocks.
+  [[nodiscard]] bool is_reader_gone();
 
   /// Ends our side, then waits for the peer's end a little, dropping at most a bounded number of bytes: so
   /// that an answer that was sent before the body was read is not lost to a reset.
@@ -76,7 +79,8 @@ class Connection {
 
   Descriptor descriptor_;
   std::unique_ptr<Transport> transport_;
-  std::string pending_;  // read beyond the head, not yet handed out
+  std::string pending_;      // read beyond the head, not yet handed out
+  std::size_t unasked_ = 0;  // bytes that the reader of a stream sent
   bool broken_ = false;
 };
 

@@ -49,7 +49,8 @@ class Exchange {
   [[nodiscard]] Clock::time_point write_deadline() const { return write_deadline_; }
 
   [[nodiscard]] bool is_broken() const { return connection_.is_broken(); }
-  [[nodiscard]] bool is_peer_gone() const { return connection_.is_peer_gone(); }
+  /// Whether the reader of a streamed answer is gone.
+  [[nodiscard]] bool is_reader_gone() { return connection_.is_reader_gone(); }
   [[nodiscard]] bool is_stopping() const { return context_.stopping; }
 
   [[nodiscard]] const std::string& request_id() const { return request_id_; }

@@ -1,18 +1,24 @@
 #include "server/http/http_server.h"
 
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include <array>
 #include <atomic>
 #include <condition_variable>
 #include <exception>
 #include <list>
 #include <mutex>
+#include <string>
 #include <string_view>
 #include <thread>
+#include <variant>
 
 #include "server/base/request_scope.h"
 #include "server/http/connection.h"
 #include "server/http/exchange.h"
 #include "server/http/http_library.h"
+#include "server/http/problem_response.h"
 
 namespace pointwright::server {
 namespace {
@@ -54,8 +60,36 @@ class FencedStream final : public httplib::Stream {
 
 /// The exchange that the library serves on this thread; its handler has no other way to find it.
 thread_local Exchange* current_exchange = nullptr;
-/// Whether this thread only tells its connection that there is no room.
-thread_local bool refuses_connection = false;
+/// What this thread has for its connection: an answer, the word that there is no room, or the door.
+enum class Treatment { kAnswer, kRefuse, kTurnAway };
+thread_local Treatment treatment = Treatment::kAnswer;
+
+/// Ends a connection without waiting for anything, on the accepting thread. A head that had come is read, so
+/// that closing resets nothing and the refusal arrives; TLS has nothing to say before its handshake.
+void turn_away(int socket, std::string_view refusal) {
+  std::array<char, 4096> asked;
+  if (!refusal.empty()) {
+    (void)::recv(socket, asked.data(), asked.size(), MSG_DONTWAIT);
+    (void)::send(socket, refusal.data(), refusal.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  }
+  ::close(socket);
+}
+
+/// The refusal of those for whom there is not even a thread that tells them: as an Exchange refuses, but the
+/// same for all.
+std::string canned_refusal(std::size_t cap) {
+  const Response response = problem_response({.kind = ProblemKind::kOverloaded,
+                                              .detail = "all connections are in use",
+                                              .limit = static_cast<double>(cap)},
+                                             "", "");
+  const std::string& body = std::get<std::string>(response.body);
+  std::string text = "HTTP/1.1 " + std::to_string(response.status) + " Service Unavailable\r\nContent-Type: ";
+  text.append(response.content_type).append("\r\n");
+  for (const auto& [name, value] : response.headers)
+    text.append(name).append(": ").append(value).append("\r\n");
+  text.append("Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nConnection: close\r\n");
+  return text.append("Content-Length: ").append(std::to_string(body.size())).append("\r\n\r\n").append(body);
+}
 
 /// Runs each connection on its own thread, under the cap.
 class ConnectionThreads final : public httplib::TaskQueue {
@@ -67,22 +101,23 @@ class ConnectionThreads final : public httplib::TaskQueue {
 
   void enqueue(std::function<void()> serve) override {
     const std::size_t running = active_.fetch_add(1);
-    const bool refuse = running >= cap_;
+    const Treatment mode = running >= cap_ ? Treatment::kRefuse : Treatment::kAnswer;
     if (running < cap_ + kRefusalThreads) {
       try {
-        std::thread([this, serve, refuse] {
-          refuses_connection = refuse;
+        std::thread([this, serve, mode] {
+          treatment = mode;
           serve();
           finish();
         }).detach();
         return;
       } catch (const std::system_error&) {
-        // No thread to be had: refuse below, on this one.
+        // No thread to be had.
       }
     }
-    refuses_connection = true;
+    // On the thread that accepts: nobody is waited for.
+    treatment = Treatment::kTurnAway;
     serve();
-    refuses_connection = false;
+    treatment = Treatment::kAnswer;
     finish();
   }
 
@@ -113,7 +148,7 @@ class ChunkSink final : public BodySink {
   bool write(std::span<const std::byte> bytes) override {
     return bytes.empty() || exchange_.write_chunk(bytes);
   }
-  [[nodiscard]] bool is_peer_gone() override { return exchange_.is_peer_gone(); }
+  [[nodiscard]] bool is_peer_gone() override { return exchange_.is_reader_gone(); }
   [[nodiscard]] bool is_stopping() const override { return exchange_.is_stopping(); }
 
  private:
@@ -169,6 +204,7 @@ class HttpServer::Fence final : public httplib::Server {
  public:
   Fence(HttpOptions options, Resolver resolver, std::function<void(const RequestLog&)> log)
       : context_{.options = std::move(options), .resolver = std::move(resolver), .log = std::move(log)} {
+    if (context_.options.tls == nullptr) refusal_ = canned_refusal(context_.options.max_connections);
     new_task_queue = [this] { return new ConnectionThreads(context_.options.max_connections, active_); };
     set_socket_options([](socket_t socket) {
       // Not SO_REUSEPORT, the library's default: a second daemon would silently share the port.
@@ -229,10 +265,14 @@ class HttpServer::Fence final : public httplib::Server {
 
  private:
   bool process_and_close_socket(socket_t socket) override {
+    if (treatment == Treatment::kTurnAway) {
+      turn_away(socket, refusal_);
+      return true;
+    }
     try {
       Connection connection(socket, context_.options.tls.get());
       serve(connection);
-      connection.linger(refuses_connection ? std::chrono::milliseconds(100) : kLingerPatience);
+      connection.linger(treatment == Treatment::kRefuse ? std::chrono::milliseconds(100) : kLingerPatience);
     } catch (...) {
       // Out of memory while reading a head, say: this connection ends, the daemon does not.
     }
@@ -240,7 +280,7 @@ class HttpServer::Fence final : public httplib::Server {
   }
 
   void serve(Connection& connection) {
-    Exchange exchange(context_, connection, refuses_connection);
+    Exchange exchange(context_, connection, treatment == Treatment::kRefuse);
     if (!exchange.read_head()) return;
     // Only the method matters to the library: whether it may send a body.
     FencedStream stream(connection, exchange,
@@ -258,6 +298,7 @@ class HttpServer::Fence final : public httplib::Server {
   }
 
   ExchangeContext context_;
+  std::string refusal_;  // empty under TLS
   std::atomic<std::size_t> active_{0};
   std::atomic<bool> run_called_{false};
   std::atomic<bool> run_ended_{false};

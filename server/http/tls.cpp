@@ -1,11 +1,17 @@
 #include "server/http/tls.h"
 
+#include <fcntl.h>
 #include <openssl/bio.h>
+#include <openssl/crypto.h>
 #include <openssl/err.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
 #include <openssl/ssl.h>
 #include <openssl/x509.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/types.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -17,10 +23,15 @@
 #include <system_error>
 #include <utility>
 
+#include "server/base/descriptor.h"
+
 namespace pointwright::server {
 namespace {
 
 constexpr std::size_t kRecordBytes = SSL3_RT_MAX_PLAIN_LENGTH;
+
+/// Far more than a chain of certificates has.
+constexpr std::uint64_t kMostPemBytes = 1U << 20U;
 
 /// What a client without TLS is told: the shortest answer that names the mistake.
 constexpr std::string_view kSpeakTls =
@@ -176,12 +187,8 @@ class TlsTransport final : public Transport {
 /// Why the last call failed, without what was in the file.
 std::string reason() {
   const char* text = nullptr;
-  // What the system says comes first, and is the cause of what follows.
-  while (const unsigned long error = ERR_get_error()) {
-    if (ERR_SYSTEM_ERROR(error) != 0) return std::generic_category().message(ERR_GET_REASON(error));
-    text = ERR_reason_error_string(error);
-  }
-  return text == nullptr ? "it cannot be read" : text;
+  while (const unsigned long error = ERR_get_error()) text = ERR_reason_error_string(error);
+  return text == nullptr ? "TLS cannot take it" : text;
 }
 
 /// Nobody is asked for a passphrase: there is no terminal.
@@ -217,6 +224,100 @@ std::shared_ptr<SSL_CTX> new_context() {
   return context;
 }
 
+/// The text of a file of certificates or of a key; cleared at its end.
+struct PemText {
+  PemText() = default;
+  PemText(const PemText&) = delete;
+  PemText& operator=(const PemText&) = delete;
+  ~PemText() { OPENSSL_cleanse(bytes.data(), bytes.size()); }
+  std::string bytes;
+};
+
+/// Reads a whole regular file. A pipe or a device must not hold who reloads: that thread also ends the
+/// daemon.
+/// Where it does not serve a sentence says why.
+std::optional<std::string> read_pem(const std::string& path, bool is_key, PemText& text) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
+  struct stat info {};
+  if (!file.is_open() || ::fstat(file.get(), &info) != 0) return std::generic_category().message(errno);
+  if (!S_ISREG(info.st_mode)) return "is not a regular file";
+  // A group of those who may read keys is what Debian has in ssl-cert.
+  if (is_key && (info.st_mode & (S_IRWXO | S_IWGRP)) != 0)
+    return "others than its owner and group may use the key, or the group may change it; its mode must be "
+           "0600 "
+           "or 0640";
+  const auto size = static_cast<std::uint64_t>(info.st_size);
+  if (size > kMostPemBytes) return "is larger than " + std::to_string(kMostPemBytes) + " bytes";
+  text.bytes.resize(static_cast<std::size_t>(size));
+  std::size_t at = 0;
+  while (at < text.bytes.size()) {
+    const ssize_t count = ::read(file.get(), text.bytes.data() + at, text.bytes.size() - at);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return std::generic_category().message(errno);
+    if (count == 0) break;  // cut short under our hands
+    at += static_cast<std::size_t>(count);
+  }
+  text.bytes.resize(at);
+  return std::nullopt;
+}
+
+using OwnBio = std::unique_ptr<BIO, int (*)(BIO*)>;
+using OwnCertificate = std::unique_ptr<X509, void (*)(X509*)>;
+using OwnKey = std::unique_ptr<EVP_PKEY, void (*)(EVP_PKEY*)>;
+
+OwnBio reader_of(const PemText& text) {
+  OwnBio bio(BIO_new_mem_buf(text.bytes.data(), static_cast<int>(text.bytes.size())), BIO_free);
+  if (bio == nullptr) throw std::bad_alloc();
+  ERR_clear_error();
+  return bio;
+}
+
+/// The server's certificate, then those between it and its authority.
+std::optional<std::string> use_chain(SSL_CTX* context, const std::string& path) {
+  PemText text;
+  if (auto problem = read_pem(path, false, text)) return problem;
+  const OwnBio bio = reader_of(text);
+  const OwnCertificate own(PEM_read_bio_X509_AUX(bio.get(), nullptr, no_passphrase, nullptr), X509_free);
+  if (own == nullptr) return "is not a PEM certificate";
+  if (SSL_CTX_use_certificate(context, own.get()) != 1) return reason();
+  while (true) {
+    OwnCertificate next(PEM_read_bio_X509(bio.get(), nullptr, no_passphrase, nullptr), X509_free);
+    if (next == nullptr) break;
+    if (SSL_CTX_add0_chain_cert(context, next.get()) != 1) return reason();
+    (void)next.release();  // the context has it now
+  }
+  const bool is_end = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
+  ERR_clear_error();
+  if (!is_end) return "is not a PEM certificate throughout";
+  return std::nullopt;
+}
+
+std::optional<std::string> use_key(SSL_CTX* context, const std::string& path,
+                                   const std::string& certificate_path) {
+  PemText text;
+  if (auto problem = read_pem(path, true, text)) return problem;
+  const OwnBio bio = reader_of(text);
+  const OwnKey key(PEM_read_bio_PrivateKey(bio.get(), nullptr, no_passphrase, nullptr), EVP_PKEY_free);
+  if (key == nullptr) return "is not a PEM key without a passphrase";
+  if (X509_check_private_key(SSL_CTX_get0_certificate(context), key.get()) != 1)
+    return "not the key of the certificate " + certificate_path;
+  if (SSL_CTX_use_PrivateKey(context, key.get()) != 1) return reason();
+  return std::nullopt;
+}
+
+bool is_expired(const SSL_CTX* context) {
+  return X509_cmp_current_time(X509_get0_notAfter(SSL_CTX_get0_certificate(context))) < 0;
+}
+
+std::string end_of(const SSL_CTX* context) {
+  const OwnBio text(BIO_new(BIO_s_mem()), BIO_free);
+  if (text == nullptr) return {};
+  ASN1_TIME_print(text.get(), X509_get0_notAfter(SSL_CTX_get0_certificate(context)));
+  char* bytes = nullptr;
+  const long size = BIO_get_mem_data(text.get(), &bytes);
+  return {bytes, static_cast<std::size_t>(size)};
+}
+
 }  // namespace
 
 TlsIdentity::TlsIdentity(std::string certificate_file, std::string key_file)
@@ -224,28 +325,25 @@ TlsIdentity::TlsIdentity(std::string certificate_file, std::string key_file)
 
 std::optional<std::string> TlsIdentity::reload() {
   const std::shared_ptr<SSL_CTX> context = new_context();
-  ERR_clear_error();
-  if (SSL_CTX_use_certificate_chain_file(context.get(), certificate_file_.c_str()) != 1)
-    return "tls_cert: " + certificate_file_ + ": " + reason();
-  const bool is_read = SSL_CTX_use_PrivateKey_file(context.get(), key_file_.c_str(), SSL_FILETYPE_PEM) == 1;
-  if (is_read ? SSL_CTX_check_private_key(context.get()) != 1
-              : ERR_GET_REASON(ERR_peek_last_error()) == X509_R_KEY_VALUES_MISMATCH)
-    return "tls_key: " + key_file_ + ": not the key of the certificate " + certificate_file_;
-  if (!is_read) return "tls_key: " + key_file_ + ": " + reason();
+  if (auto problem = use_chain(context.get(), certificate_file_))
+    return "tls_cert: " + certificate_file_ + ": " + *problem;
+  if (auto problem = use_key(context.get(), key_file_, certificate_file_))
+    return "tls_key: " + key_file_ + ": " + *problem;
   const std::lock_guard lock(mutex_);
+  if (context_ != nullptr && is_expired(context.get()) && !is_expired(context_.get()))
+    return "tls_cert: " + certificate_file_ + ": has expired: " + end_of(context.get());
   context_ = context;
   return std::nullopt;
 }
 
 std::string TlsIdentity::valid_until() const {
   const std::lock_guard lock(mutex_);
-  if (context_ == nullptr) return {};
-  const std::unique_ptr<BIO, int (*)(BIO*)> text(BIO_new(BIO_s_mem()), BIO_free);
-  if (text == nullptr) return {};
-  ASN1_TIME_print(text.get(), X509_get0_notAfter(SSL_CTX_get0_certificate(context_.get())));
-  char* bytes = nullptr;
-  const long size = BIO_get_mem_data(text.get(), &bytes);
-  return {bytes, static_cast<std::size_t>(size)};
+  return context_ == nullptr ? std::string() : end_of(context_.get());
+}
+
+bool TlsIdentity::has_expired() const {
+  const std::lock_guard lock(mutex_);
+  return context_ != nullptr && is_expired(context_.get());
 }
 
 std::unique_ptr<Transport> TlsIdentity::accept(int descriptor) const {

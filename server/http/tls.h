@@ -18,12 +18,16 @@ class TlsIdentity {
   /// The files are read by reload() alone.
   TlsIdentity(std::string certificate_file, std::string key_file);
 
-  /// Reads the chain of certificates and the key, both PEM, for the connections that come from now on. Where
-  /// that fails a sentence says why, and what was in force stays.
+  /// Reads the chain of certificates and the key, both PEM in regular files and the key readable by its owner
+  /// and group at most, for the connections that come from now on. Never waits for a pipe. Where that fails,
+  /// or the certificate has expired and the one in force has not, a sentence says so, and what was in force
+  /// stays.
   std::optional<std::string> reload();
 
   /// Until when the certificate in force is valid, as "Nov 23 03:27:15 2026 GMT"; empty before the first one.
   [[nodiscard]] std::string valid_until() const;
+  /// Whether the certificate in force is past that.
+  [[nodiscard]] bool has_expired() const;
 
   /// The transport of an accepted socket. The handshake happens within its first reads. A peer that speaks
   /// HTTP without TLS is told so, and its connection ended. Throws where there is no memory.

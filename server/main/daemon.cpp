@@ -87,12 +87,21 @@ std::optional<std::string> write_port_file(const std::string& path, std::uint16_
   return written ? std::nullopt : std::optional<std::string>(written.error().message);
 }
 
+void log_certificate(const TlsIdentity& tls, const char* event, const Config& config, Log& log) {
+  log.write(LogLevel::kInfo, event, {{"file", config.tls_cert}, {"valid_until", tls.valid_until()}});
+  if (tls.has_expired())
+    log.write(LogLevel::kWarn, "certificate-expired",
+              {{"message", "clients refuse a certificate that has expired"},
+               {"file", config.tls_cert},
+               {"valid_until", tls.valid_until()}});
+}
+
 /// The certificate of the settings; null where they name none. Throws std::runtime_error.
 std::shared_ptr<TlsIdentity> tls_identity(const Config& config, Log& log) {
   if (config.tls_cert.empty()) return nullptr;
   auto tls = std::make_shared<TlsIdentity>(config.tls_cert, config.tls_key);
   if (auto problem = tls->reload()) throw std::runtime_error(*problem);
-  log.write(LogLevel::kInfo, "certificate", {{"file", config.tls_cert}, {"valid_until", tls->valid_until()}});
+  log_certificate(*tls, "certificate", config, log);
   return tls;
 }
 
@@ -105,15 +114,16 @@ int wait_for_end(const sigset_t& signals, Service& service, TlsIdentity* tls, Lo
     if (signal != SIGHUP && signal != SIGUSR1) return signal;
     if (auto problem = log.reopen()) log.write(LogLevel::kError, "reopen-failed", {{"message", *problem}});
     if (signal == SIGUSR1) continue;
-    if (auto problem = tls == nullptr ? std::nullopt : tls->reload())
-      log.write(LogLevel::kError, "reload-failed", {{"message", *problem + "; the old certificate stays"}});
-    else if (tls != nullptr)
-      log.write(LogLevel::kInfo, "reloaded", {{"valid_until", tls->valid_until()}});
     if (auto problem = service.access.tokens.reload()) {
       log.write(LogLevel::kError, "reload-failed", {{"message", *problem}});
     } else {
       log.write(LogLevel::kInfo, "reloaded", {{"tokens", service.access.tokens.list().size()}});
     }
+    if (tls == nullptr) continue;
+    if (auto problem = tls->reload())
+      log.write(LogLevel::kError, "reload-failed", {{"message", *problem + "; the old certificate stays"}});
+    else
+      log_certificate(*tls, "reloaded", service.config, log);
   }
 }
 

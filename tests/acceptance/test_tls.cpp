@@ -1,6 +1,7 @@
 // The daemon with a certificate of its own: what it serves, whom it refuses, and how its clients verify it.
 
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 #include <chrono>
 #include <csignal>
@@ -122,15 +123,20 @@ TEST_CASE("a stream whose reader ends TLS or its connection is noticed") {
     const std::size_t at = metrics.body.find("\npointwright_streams ");
     return at == std::string::npos ? -1 : std::stoi(metrics.body.substr(at + 21));
   };
-  for (const bool says_so : {true, false}) {
+  enum class Leave { kEndsTls, kSpeaksAndEndsTls, kCloses, kGoesOnSending };
+  for (const Leave leave :
+       {Leave::kEndsTls, Leave::kSpeaksAndEndsTls, Leave::kCloses, Leave::kGoesOnSending}) {
+    CAPTURE(static_cast<int>(leave));
     auto stream = std::make_unique<TlsClient>(tls.daemon->port(), tls.certificate);
     stream->send("GET " + session + "/stream HTTP/1.1\r\nHost: localhost\r\n\r\n");
     std::string streamed;
     while (streamed.find("PWFR") == std::string::npos) REQUIRE(stream->receive_some(streamed));
     CHECK(is_within(std::chrono::seconds(5), [&] { return streams() == 1; }));
+    if (leave == Leave::kSpeaksAndEndsTls) stream->send(std::string(5000, 'x'));
     // The end of TLS alone leaves the connection as it is.
-    if (says_so) SSL_shutdown(stream->ssl());
-    if (!says_so) stream.reset();
+    if (leave == Leave::kEndsTls || leave == Leave::kSpeaksAndEndsTls) SSL_shutdown(stream->ssl());
+    if (leave == Leave::kCloses) stream.reset();
+    if (leave == Leave::kGoesOnSending) stream->send(std::string(100'000, 'x'));
     CHECK(is_within(std::chrono::seconds(10), [&] { return streams() == 0; }));
   }
 }
@@ -218,7 +224,7 @@ TEST_CASE("SIGHUP takes a new certificate; a bad one leaves the old in force") {
   write_certificate(tls.certificate, tls.key);
   CHECK_THROWS(TlsClient(tls.daemon->port(), tls.certificate));  // not before it is asked for
   ::kill(tls.daemon->pid(), SIGHUP);
-  REQUIRE(logged("\"reloaded\""));
+  REQUIRE(logged("\"reloaded\",\"file\":"));
   CHECK(tls.ask("GET", "/healthz").status == 200);
   CHECK_THROWS(TlsClient(tls.daemon->port(), tls.folder / "old.pem"));
 
@@ -236,11 +242,60 @@ TEST_CASE("SIGHUP takes a new certificate; a bad one leaves the old in force") {
   CHECK(tls.daemon->log().find("secret") == std::string::npos);
 }
 
+TEST_CASE("a pipe in the certificate's place holds up neither the tokens nor the end of the daemon") {
+  const TemporaryFolder tokens;
+  const std::string file = tokens / "tokens.json";
+  REQUIRE(run({POINTWRIGHTD_PATH, "token", "add", "ann", "--tokens", file}).status == 0);
+  Certified tls({"--tokens", file});
+  for (const bool is_key : {false, true}) {
+    const std::string path = is_key ? tls.key : tls.certificate;
+    std::filesystem::rename(path, path + ".kept");
+    REQUIRE(::mkfifo(path.c_str(), 0600) == 0);
+    ::kill(tls.daemon->pid(), SIGHUP);
+    CHECK(is_within(std::chrono::seconds(20), [&] {
+      return tls.daemon->log().find(path + ": is not a regular file; the old certificate stays") !=
+             std::string::npos;
+    }));
+    CHECK(tls.daemon->log().find("\"tokens\":1") != std::string::npos);
+    std::filesystem::remove(path);
+    std::filesystem::rename(path + ".kept", path);
+  }
+  CHECK(tls.ask("GET", "/healthz").status == 200);
+  CHECK(tls.daemon->stop(SIGTERM) == 0);
+}
+
+TEST_CASE("a certificate that has expired does not replace one that has not") {
+  Certified tls;
+  const auto logged = [&](const std::string& text) {
+    return is_within(std::chrono::seconds(10),
+                     [&] { return tls.daemon->log().find(text) != std::string::npos; });
+  };
+  CHECK(tls.daemon->log().find("certificate-expired") == std::string::npos);
+  std::filesystem::copy_file(tls.certificate, tls.folder / "valid.pem");
+  write_certificate(tls.certificate, tls.key, "DNS:localhost", -10);
+  ::kill(tls.daemon->pid(), SIGHUP);
+  REQUIRE(logged(tls.certificate + ": has expired: "));
+  tls.certificate = tls.folder / "valid.pem";
+  CHECK(tls.ask("GET", "/healthz").status == 200);
+
+  // A daemon that begins with one serves it, and says so; the next one that has expired is as good.
+  write_certificate(tls.folder / "past.pem", tls.folder / "past.key", "DNS:localhost", -10);
+  tls.daemon = std::make_unique<Daemon>(
+      std::vector<std::string>{"--tls-cert", tls.folder / "past.pem", "--tls-key", tls.folder / "past.key"});
+  REQUIRE(logged("\"certificate-expired\""));
+  CHECK_THROWS(TlsClient(tls.daemon->port(), tls.folder / "past.pem"));
+  ::kill(tls.daemon->pid(), SIGHUP);
+  REQUIRE(logged("\"reloaded\",\"file\":\"" + (tls.folder / "past.pem")));
+}
+
 TEST_CASE("files that do not serve are named with the reason at the start, and nothing of them is printed") {
   const TemporaryFolder folder;
   write_certificate(folder / "cert.pem", folder / "key.pem");
   write_certificate(folder / "cert2.pem", folder / "key2.pem");
   std::ofstream(folder / "broken.pem") << "top-secret-text";
+  using std::filesystem::perms;
+  const perms own = perms::owner_read | perms::owner_write;
+  std::filesystem::permissions(folder / "broken.pem", own);
   const auto start = [&](const std::string& certificate, const std::string& key) {
     return run({POINTWRIGHTD_PATH, "--port", "0", "--tls-cert", certificate, "--tls-key", key});
   };
@@ -259,8 +314,31 @@ TEST_CASE("files that do not serve are named with the reason at the start, and n
                                 : start(folder / "broken.pem", folder / "key.pem");
     CHECK(broken.status == 1);
     CHECK(broken.err.find(folder / "broken.pem") != std::string::npos);
+    CHECK(broken.err.find(is_key ? "is not a PEM key without a passphrase" : "is not a PEM certificate") !=
+          std::string::npos);
     CHECK(broken.err.find("top-secret") == std::string::npos);
   }
+  // A chain that is cut off within its second certificate.
+  std::filesystem::copy_file(folder / "cert.pem", folder / "cut.pem");
+  std::ofstream(folder / "cut.pem", std::ios::app) << "-----BEGIN CERTIFICATE-----\nMIIB\n";
+  CHECK(start(folder / "cut.pem", folder / "key.pem").err.find("is not a PEM certificate throughout") !=
+        std::string::npos);
+  std::ofstream(folder / "large.pem") << std::string((1U << 20U) + 1, '\n');
+  CHECK(start(folder / "large.pem", folder / "key.pem").err.find("is larger than 1048576 bytes") !=
+        std::string::npos);
+  CHECK(start("/dev/zero", folder / "key.pem").err.find("is not a regular file") != std::string::npos);
+  // A key that others may read is no secret; one that a group may read is.
+  for (const perms more : {perms::others_read, perms::group_write, perms::others_write}) {
+    std::filesystem::permissions(folder / "key.pem", own | more);
+    const Ended open = start(folder / "cert.pem", folder / "key.pem");
+    CHECK(open.status == 1);
+    CHECK(open.err.find(folder / "key.pem") != std::string::npos);
+    CHECK(open.err.find("its mode must be 0600 or 0640") != std::string::npos);
+  }
+  std::filesystem::permissions(folder / "key.pem", own | perms::group_read);
+  Daemon grouped({"--tls-cert", folder / "cert.pem", "--tls-key", folder / "key.pem"});
+  CHECK(TlsClient(grouped.port(), folder / "cert.pem")
+            .send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"));
   const Ended half = run({POINTWRIGHTD_PATH, "--port", "0", "--tls-cert", folder / "cert.pem"});
   CHECK(half.status == 2);
   CHECK(half.err.find("tls_key") != std::string::npos);

@@ -6,9 +6,11 @@
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -27,16 +29,17 @@ using OwnCertificate = std::unique_ptr<X509, OpenSslDeleter<X509, X509_free>>;
 using OwnContext = std::unique_ptr<SSL_CTX, OpenSslDeleter<SSL_CTX, SSL_CTX_free>>;
 using OwnSsl = std::unique_ptr<SSL, OpenSslDeleter<SSL, SSL_free>>;
 
-/// Writes a new key and a certificate signed by it, for the names.
+/// Writes a new key, readable by its owner alone, and a certificate signed by it, for the names.
 inline void write_certificate(const std::string& certificate_file, const std::string& key_file,
-                              const char* names = "DNS:localhost,DNS:pointwright.test,IP:127.0.0.1") {
+                              const char* names = "DNS:localhost,DNS:pointwright.test,IP:127.0.0.1",
+                              long valid_seconds = 86'400) {
   const OwnKey key(EVP_EC_gen("P-256"));
   const OwnCertificate certificate(X509_new());
   X509* const made = certificate.get();
   X509_set_version(made, 2);
   ASN1_INTEGER_set(X509_get_serialNumber(made), 1);
-  X509_gmtime_adj(X509_getm_notBefore(made), -60);
-  X509_gmtime_adj(X509_getm_notAfter(made), 86'400);
+  X509_gmtime_adj(X509_getm_notBefore(made), std::min(valid_seconds, 0L) - 60);
+  X509_gmtime_adj(X509_getm_notAfter(made), valid_seconds);
   X509_set_pubkey(made, key.get());
   X509_NAME* const name = X509_get_subject_name(made);
   const auto* common = reinterpret_cast<const unsigned char*>("pointwright.test");
@@ -61,6 +64,8 @@ inline void write_certificate(const std::string& certificate_file, const std::st
   write(key_file, [&](std::FILE* file) {
     return PEM_write_PrivateKey(file, key.get(), nullptr, nullptr, 0, nullptr, nullptr);
   });
+  std::filesystem::permissions(key_file,
+                               std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
 }
 
 /// Verifies the server's certificate by `ca` and its name as localhost. Throws where there is no TLS.

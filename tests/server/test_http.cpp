@@ -334,6 +334,35 @@ TEST_CASE("connections beyond the cap are told to come back later") {
   CHECK(comes_true([&] { return status_of(exchange(server.port(), get("/"))) == 200; }));
 }
 
+TEST_CASE("silent connections far beyond the cap do not hold the thread that accepts") {
+  HttpOptions options;
+  options.max_connections = 4;
+  options.head_deadline = std::chrono::seconds(60);
+  TestServer server(options);
+  std::vector<std::unique_ptr<RawClient>> first;
+  for (int i = 0; i < 4; ++i) first.push_back(std::make_unique<RawClient>(server.port()));
+  REQUIRE(comes_true([&] { return server.server().active_connections() == 4; }));
+  // A third of a second for each, one after the other, would take minutes.
+  std::vector<std::unique_ptr<RawClient>> silent;
+  for (int i = 0; i < 400; ++i) silent.push_back(std::make_unique<RawClient>(server.port()));
+  int refused = 0;
+  for (const auto& client : silent) {
+    const std::string told = client->receive_all(std::chrono::seconds(20));
+    if (told.empty()) continue;  // one of those for whom a thread waited
+    ++refused;
+    CHECK(status_of(told) == 503);
+    CHECK(told.find("Retry-After: ") != std::string::npos);
+    CHECK(told.find("\r\nConnection: close\r\n") != std::string::npos);
+    CHECK(told.find("Content-Length: " + std::to_string(body_of(told).size()) + "\r\n") != std::string::npos);
+    CHECK(body_of(told).find("all connections are in use") != std::string::npos);
+  }
+  CHECK(refused > 100);
+  CHECK(server.calls == 0);
+  for (int i = 0; i < 400; ++i) silent.push_back(std::make_unique<RawClient>(server.port()));
+  first.clear();
+  CHECK(comes_true([&] { return status_of(exchange(server.port(), get("/"))) == 200; }));
+}
+
 TEST_CASE("an exception in a handler is a 500 that says nothing of the inside") {
   TestServer server;
   const std::string answer = exchange(server.port(), get("/throw"));
@@ -362,6 +391,19 @@ TEST_CASE("a stream ends soon after its client is gone") {
   REQUIRE(comes_true([&] { return server.open_streams == 1; }));
   client.close();
   CHECK(comes_true([&] { return server.open_streams == 0; }, std::chrono::milliseconds(2000)));
+}
+
+TEST_CASE("a stream whose client goes on sending ends") {
+  TestServer server;
+  RawClient client(server.port());
+  client.send(get("/stream"));
+  REQUIRE(comes_true([&] { return server.open_streams == 1; }));
+  client.send("a little is dropped");
+  std::string text;
+  for (int i = 0; i < 20; ++i) REQUIRE(client.receive_some(text, std::chrono::seconds(10)));
+  CHECK(server.open_streams == 1);
+  client.send(std::string(64 * 1024, 'x'));
+  CHECK(comes_true([&] { return server.open_streams == 0; }));
 }
 
 TEST_CASE("a stream whose client does not read is dropped at its deadline") {

@@ -122,6 +122,8 @@ HttpAnswer HttpClient::send(const HttpRequest& request) const {
     if (!ca_.empty()) client.set_ca_cert_path(ca_);
     SSL_CTX_set_min_proto_version(client.ssl_context(), TLS1_2_VERSION);
   }
+  // Head and body are sent one after the other: the second would wait for the first one's acknowledgement.
+  client.set_tcp_nodelay(true);
   client.set_connection_timeout(kConnectSeconds);
   client.set_read_timeout(kSilenceSeconds);
   client.set_write_timeout(kSilenceSeconds);
