@@ -210,11 +210,16 @@ TEST_CASE("uploads that fill the memory for uploads leave documents theirs") {
   const std::string head = upload_head(1000000);
   RawClient first(daemon.port());
   first.send(head + std::string(999'999, '0'));
-  Reply refused;
-  for (int i = 0; i < 100 && refused.status != 503; ++i) {
-    refused = daemon.upload(std::string(900'000, '0'), "text/plain");
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
+  // Not before all of it is held: two that ask for the rest at once are both refused.
+  const auto held = [&] {
+    const std::string text = daemon.get("/metrics").body;
+    const std::string name = "pointwright_budget_held{budget=\"uploads\"} ";
+    const std::size_t at = text.find(name);
+    return at == std::string::npos ? 0.0 : std::stod(text.substr(at + name.size()));
+  };
+  for (int i = 0; i < 500 && held() < 999'999.0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  const Reply refused = daemon.upload(std::string(900'000, '0'), "text/plain");
   CHECK(refused.status == 503);
   CHECK(refused.headers.count("retry-after") == 1);
   CHECK(daemon.ask("POST", session + "/regions/one/operations", R"({"mode":"add","shape":{"type":"all"}})")
