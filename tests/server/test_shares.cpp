@@ -233,7 +233,7 @@ TEST_CASE("a folder of the layout before keeps its sessions, which can then be s
     path = service.open_painted();
   }
   run_sql(config.data + "/pointwright.db",
-          "DROP TABLE shares; PRAGMA user_version=" + std::to_string(kBeforeShares));
+          "DROP TABLE shares; DROP TABLE jobs; PRAGMA user_version=" + std::to_string(kBeforeShares));
   std::string capability;
   {
     TestService service(config);
