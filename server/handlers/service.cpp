@@ -35,7 +35,8 @@ Service::Service(Config settings, ServiceParts parts)
       access(config.limits, token_file(config)),
       clouds(config.limits, archive.get(), cloud_loader(decode_file, decode, background, config.limits)),
       images(config.limits, archive.get()),
-      uploads(config.limits, folder.uploads()),
+      uploads(config.limits, folder.uploads(),
+              [this](int file) { return archive != nullptr && archive->has_file(file); }),
       sessions(
           config.limits, clouds,
           {.interactive = interactive,
