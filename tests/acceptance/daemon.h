@@ -46,8 +46,8 @@ struct Reply {
 
 class Daemon {
  public:
-  /// Starts it with further arguments, and "NAME=value" beside the environment of the test, and waits until it
-  /// answers. Throws std::runtime_error with its log where it does not.
+  /// Starts it with further arguments, and "NAME=value" beside the environment of the test, and waits until
+  /// it answers. Throws std::runtime_error with its log where it does not.
   explicit Daemon(const std::vector<std::string>& arguments = {},
                   const std::vector<std::string>& environment = {});
   ~Daemon();

@@ -28,10 +28,11 @@ class FaultyDisk {
   [[nodiscard]] std::vector<std::string> environment() const;
   [[nodiscard]] FaultyDiskPage& page() { return *page_; }
 
-  /// Which names there are after a loss of power. File systems bring names to the disk when they are asked to,
-  /// or earlier.
+  /// Which names there are after a loss of power. File systems bring names to the disk when they are asked
+  /// to, or earlier.
   enum class Names { kSynced, kAll };
-  /// Another folder, as the data folder would be after a loss of power: of every file the bytes that were synced.
+  /// Another folder, as the data folder would be after a loss of power: of every file the bytes that were
+  /// synced.
   std::string after_power_loss(Names names);
 
  private:

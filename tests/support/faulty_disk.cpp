@@ -1,9 +1,10 @@
-// A disk that fails on demand, preloaded into the real daemon by tests: power that goes at the k-th fsync, syncs
-// that fail, space that ends. It stands between the daemon and the calls by which the daemon and SQLite write.
+// A disk that fails on demand, preloaded into the real daemon by tests: power that goes at the k-th fsync,
+// syncs and writes that fail, space that ends. It stands between the daemon and the calls by which the
+// daemon and SQLite write.
 //
-// What is durable: of a file, its bytes at its last fsync or fdatasync; of a folder, its names at its last fsync.
-// They are kept in `durable` as files/<inode> and names/<path, with % for />, a line "<inode> <d or f> <name>"
-// each. The real files go on as if nothing had happened: they are the page cache.
+// What is durable: of a file, its bytes at its last fsync or fdatasync; of a folder, its names at its last
+// fsync. They are kept in `durable` as files/<inode> and names/<path, with % for />, a line "<inode> <d or
+// f> <name>" each. The real files go on as if nothing had happened: they are the page cache.
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -114,6 +115,11 @@ void keep_bytes(int file, ino_t inode) {
   ::close(from);
 }
 
+/// Whether what is to fail from the k-th time on does at that one.
+bool has_come(std::int64_t from, std::int64_t number) {
+  return from > 0 && number >= from;
+}
+
 int sync_file(int file, long call) {
   std::string path;
   if (!find_below(file, path)) return static_cast<int>(::syscall(call, file));
@@ -123,7 +129,7 @@ int sync_file(int file, long call) {
     ::kill(::getpid(), SIGKILL);
     while (true) ::pause();
   }
-  if (page->fail_from > 0 && number >= page->fail_from) {
+  if (has_come(page->fail_syncs_from, number) || has_come(page->fail_writes_from, page->write_count)) {
     errno = EIO;
     return -1;
   }
@@ -141,8 +147,12 @@ ssize_t write_file(int file, const void* bytes, std::size_t size, off_t at) {
     return at < 0 ? ::syscall(SYS_write, file, bytes, count)
                   : ::syscall(SYS_pwrite64, file, bytes, count, at);
   };
-  if (page == nullptr || page->room < 0 || !find_below(file, path)) return write_now(size);
+  if (!find_below(file, path)) return write_now(size);
   const std::lock_guard lock(turn);
+  if (has_come(page->fail_writes_from, ++page->write_count)) {
+    errno = EIO;
+    return -1;
+  }
   struct stat info {};
   if (::fstat(file, &info) != 0) std::abort();
   const off_t begin = at < 0 ? ::lseek(file, 0, SEEK_CUR) : at;
