@@ -34,7 +34,7 @@ Response get_readiness(Service& service, const Request& request) {
     return problem_response({.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"}, request);
   if (!service.is_ready)
     return problem_response({.kind = ProblemKind::kOverloaded, .detail = "the server is starting"}, request);
-  if (service.archive != nullptr && service.archive->has_failed())
+  if (service.uploads.has_failed() || (service.archive != nullptr && service.archive->has_failed()))
     return problem_response(
         {.kind = ProblemKind::kStorageFailed, .detail = "the disk has failed: nothing can be changed"},
         request);

@@ -46,7 +46,8 @@ Service::Service(Config settings, ServiceParts parts)
       access(config.limits, token_file(config), kept_shares.get()),
       clouds(config.limits, archive.get(), cloud_loader(decode_file, decode, background, config.limits)),
       images(config.limits, archive.get()),
-      uploads(config.limits, folder.uploads(), folder.jobs()),
+      uploads(config.limits, folder.uploads(),
+              [this](int file) { return archive != nullptr && archive->has_file(file); }),
       sessions(
           config.limits, clouds,
           {.interactive = interactive,

@@ -181,7 +181,10 @@ Outcome<std::shared_ptr<BodyTarget>> open_new_upload(Service& service, const Req
     return charged.problem();
   }
   auto writer = service.uploads.write(made.value().record.id, 0, body, checksum.value());
-  if (!writer.ok()) return writer.problem();
+  if (!writer.ok()) {
+    static_cast<void>(service.uploads.remove(made.value().record.id).ok());  // nobody was told of it
+    return writer.problem();
+  }
   writer.value()->begins_upload();
   return std::shared_ptr<BodyTarget>(std::move(writer.value()));
 }

@@ -331,6 +331,15 @@ BlobStore::IsUsed Archive::is_used() {
   };
 }
 
+bool Archive::has_file(int file) {
+  try {
+    const std::string sha256 = blobs_.name_of(file);
+    return !sha256.empty() && is_used()(sha256);
+  } catch (const DatabaseError&) {
+    return false;  // nobody can tell
+  }
+}
+
 void Archive::sweep() {
   blobs_.sweep(is_used());
   // Paintings of edits that were undone and replaced.

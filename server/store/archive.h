@@ -86,6 +86,9 @@ class Archive {
     return blobs_.read(sha256);
   }
 
+  /// Whether the open file is that of a cloud or an image. Cost: looks at all of them.
+  [[nodiscard]] bool has_file(int file);
+
   /// What a session hands its changes to. The archive must outlive it.
   [[nodiscard]] std::shared_ptr<SessionKeeper> keeper(const std::string& session);
 

@@ -149,6 +149,13 @@ Outcome<std::vector<std::byte>> BlobStore::read(const std::string& sha256) const
   return Problem{.kind = ProblemKind::kOverloaded, .detail = "the stored file cannot be read now"};
 }
 
+std::string BlobStore::name_of(int file) const {
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.blobs(), none))
+    if (is_named(file, entry.path().string())) return entry.path().filename().string();
+  return {};
+}
+
 void BlobStore::drop(const std::string& sha256, const IsUsed& is_used) {
   const std::lock_guard lock(mutex_);
   if (const auto pin = pins_.find(sha256); pin != pins_.end() && !pin->second.expired()) return;

@@ -49,6 +49,8 @@ class BlobStore {
   Outcome<std::shared_ptr<const Open>> open(const std::string& sha256) const;
   /// The same, read whole.
   Outcome<std::vector<std::byte>> read(const std::string& sha256) const;
+  /// The hash under which the open file is stored; empty where it is not. Cost: looks at every blob.
+  [[nodiscard]] std::string name_of(int file) const;
   /// Deletes the blob unless it is pinned or used.
   void drop(const std::string& sha256, const IsUsed& is_used);
   /// Deletes everything else than blobs that are used. Pre: nothing is being stored.

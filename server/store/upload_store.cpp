@@ -38,6 +38,11 @@ Problem out_of_space(std::uint64_t free, std::uint64_t wanted) {
           .actual = static_cast<double>(wanted)};
 }
 
+Problem storage_failed() {
+  return {.kind = ProblemKind::kStorageFailed,
+          .detail = "the disk has failed: uploads wait until the operator has looked into it"};
+}
+
 std::uint64_t free_bytes(const std::string& folder) {
   struct statvfs info {};
   if (::statvfs(folder.c_str(), &info) != 0) return 0;
@@ -60,11 +65,17 @@ Descriptor open_bytes(const std::string& path, int flags) {
   return Descriptor(::open(path.c_str(), flags | O_NOFOLLOW | O_CLOEXEC, 0600));
 }
 
-/// Removes the mark of an upload; it does not come back. False: the disk does not say so.
+/// Removes the mark of an upload; it does not come back. False: errno says why it might.
 bool drop_mark(const std::string& folder, const std::string& id) {
   const std::string path = upload_mark_path(folder, id);
   if (::unlink(path.c_str()) != 0) return errno == ENOENT;
   return sync_folder(folder);
+}
+
+/// An errno for what became of a file; 0: it is there.
+int number_of(const Result<void>& written) {
+  if (written) return 0;
+  return written.error().code == ErrorCode::kTooLarge ? ENOSPC : EIO;
 }
 
 }  // namespace
@@ -80,15 +91,9 @@ struct UploadStore::Entry {
 
 // ---- the store ----
 
-UploadStore::UploadStore(const Limits& limits, std::string folder, std::string jobs)
+UploadStore::UploadStore(const Limits& limits, std::string folder, const IsImported& is_imported)
     : limits_(limits), folder_(std::move(folder)) {
-  std::error_code none;
-  for (const auto& job : std::filesystem::directory_iterator(jobs, none)) {
-    struct stat info {};
-    if (::lstat((job.path() / kJobInputName).c_str(), &info) == 0) ++job_links_[info.st_ino];
-  }
-  load();
-  job_links_.clear();
+  load(is_imported);
   sweep();
   sweeper_ = std::thread([this] { sweep_until_stopped(); });
 }
@@ -102,11 +107,11 @@ UploadStore::~UploadStore() {
   sweeper_.join();
 }
 
-void UploadStore::load() {
+void UploadStore::load(const IsImported& is_imported) {
   std::vector<std::filesystem::path> stray;
   for (const auto& file : std::filesystem::directory_iterator(folder_)) {
     const std::string id = file.path().stem().string();
-    const bool is_known = entries_.contains(id) || (protocol::is_valid_id(id) && load_one(id));
+    const bool is_known = entries_.contains(id) || (protocol::is_valid_id(id) && load_one(id, is_imported));
     if (!is_known) stray.push_back(file.path());
   }
   // Bytes without a record, halves of records, and what nobody of us wrote.
@@ -114,21 +119,21 @@ void UploadStore::load() {
   for (const auto& path : stray) std::filesystem::remove(path, ignored);
 }
 
-bool UploadStore::load_one(const std::string& id) {
+bool UploadStore::load_one(const std::string& id, const IsImported& is_imported) {
   auto record = read_upload_record(folder_, id);
   const Descriptor file = open_bytes(upload_bytes_path(folder_, id), O_RDWR);
   struct stat info {};
   if (!record || !file.is_open() || ::fstat(file.get(), &info) != 0 || !S_ISREG(info.st_mode)) return false;
-  auto offset = static_cast<std::uint64_t>(info.st_size);
+  const auto size = static_cast<std::uint64_t>(info.st_size);
+  std::uint64_t offset = size;
   if (const auto mark = read_file(upload_mark_path(folder_, id), 32); mark) {
     // The last bytes were to be held against a checksum that never came to be.
     const std::string text(reinterpret_cast<const char*>(mark.value().data()), mark.value().size());
     offset = std::min<std::uint64_t>(offset, std::strtoull(text.c_str(), nullptr, 10));
   }
   offset = std::min(offset, record->length);
-  const auto jobs = job_links_.find(info.st_ino);
-  const nlink_t known = 1 + (jobs == job_links_.end() ? 0 : jobs->second);
-  if (info.st_nlink > known) return false;  // it was imported: its bytes are a cloud's, and stay
+  // Another name is a cloud's: the import is done, or it was stopped before the cloud was there. Never cut.
+  if (info.st_nlink > 1 && (offset != size || is_imported(file.get()))) return false;
   if (::ftruncate(file.get(), static_cast<off_t>(offset)) != 0) return false;
   // What the last process wrote may not have reached the disk; only then may it be told.
   if (::fdatasync(file.get()) != 0) return false;
@@ -219,7 +224,18 @@ std::optional<Problem> UploadStore::check_room_locked(const UploadRecord& record
   return std::nullopt;
 }
 
+Problem UploadStore::problem_of(int number, std::uint64_t wanted) {
+  if (number == ENOSPC || number == EDQUOT || number == EFBIG)
+    return out_of_space(free_bytes(folder_), wanted);
+  if (number == EMFILE || number == ENFILE || number == ENOMEM)
+    return {.kind = ProblemKind::kOverloaded, .detail = "the upload's file cannot be opened now"};
+  // What was handed to the disk and not taken may or may not be there: trying again would hide it.
+  failed_ = true;
+  return storage_failed();
+}
+
 Outcome<UploadStatus> UploadStore::create(UploadRecord record) {
+  if (failed_) return storage_failed();
   sweep();
   record.id = random_id();
   record.created = system_clock::now();
@@ -234,13 +250,13 @@ Outcome<UploadStatus> UploadStore::create(UploadRecord record) {
     entries_.emplace(id, entry);
   }
   const Descriptor file = open_bytes(upload_bytes_path(folder_, id), O_RDWR | O_CREAT | O_EXCL);
-  const bool made =
-      file.is_open() && ::fsync(file.get()) == 0 && write_upload_record(folder_, entry->record).ok();
+  int number = file.is_open() && ::fsync(file.get()) == 0 ? 0 : errno;
+  if (number == 0) number = number_of(write_upload_record(folder_, entry->record));
   const std::lock_guard lock(mutex_);
-  if (made) return status_of(*entry);
+  if (number == 0) return status_of(*entry);
   remove_files(id);
   entries_.erase(id);
-  return out_of_space(free_bytes(folder_), entry->record.length);
+  return problem_of(number, entry->record.length);
 }
 
 Outcome<std::shared_ptr<UploadStore::Writer>> UploadStore::write(const std::string& id, std::uint64_t offset,
@@ -251,6 +267,7 @@ Outcome<std::shared_ptr<UploadStore::Writer>> UploadStore::write(const std::stri
     const std::lock_guard lock(mutex_);
     entry = find_locked(id);
     if (entry == nullptr) return not_found();
+    if (failed_) return storage_failed();
     if (entry->is_held) return locked();
     if (offset != entry->offset)
       return Problem{.kind = ProblemKind::kUploadOffset,
@@ -290,12 +307,19 @@ std::vector<UploadStatus> UploadStore::list() const {
 }
 
 Outcome<Done> UploadStore::remove(const std::string& id) {
-  const std::lock_guard lock(mutex_);
-  const auto entry = find_locked(id);
-  if (entry == nullptr) return not_found();
-  if (entry->is_held) return locked();
+  {
+    const std::lock_guard lock(mutex_);
+    const auto entry = find_locked(id);
+    if (entry == nullptr) return not_found();
+    if (entry->is_held) return locked();
+    entry->is_held = true;
+  }
   remove_files(id);
+  // Nobody waits for the disk under the lock.
+  const int number = sync_folder(folder_) ? 0 : errno;
+  const std::lock_guard lock(mutex_);
   entries_.erase(id);
+  if (number != 0) return problem_of(number, 0);
   return Done{};
 }
 
@@ -344,23 +368,22 @@ UploadStore::Writer::~Writer() {
 bool UploadStore::Writer::open() {
   const std::string& id = entry_->record.id;
   file_ = open_bytes(upload_bytes_path(store_.folder_, id), O_RDWR);
-  bool ready = file_.is_open();
-  if (ready && checksum_) {
+  int number = file_.is_open() ? 0 : errno;
+  if (number == 0 && checksum_) {
     const std::string text = std::to_string(begin_);
-    ready = write_file_atomically(upload_mark_path(store_.folder_, id),
-                                  std::as_bytes(std::span(text.data(), text.size())))
-                .ok();
-  } else if (ready) {
-    ready = drop_mark(store_.folder_, id);  // of a body before that could not be settled
+    number = number_of(write_file_atomically(upload_mark_path(store_.folder_, id),
+                                             std::as_bytes(std::span(text.data(), text.size()))));
+  } else if (number == 0 && !drop_mark(store_.folder_, id)) {
+    number = errno;  // the mark is of a body before that could not be settled
   }
-  if (!ready) problem_ = out_of_space(free_bytes(store_.folder_), 1);
-  return ready;
+  if (number != 0) problem_ = store_.problem_of(number, 1);
+  return number == 0;
 }
 
 bool UploadStore::Writer::write(std::span<const std::byte> bytes) {
   if (checksum_) digest_.add(bytes);
   if (!write_all(file_.get(), bytes, at_)) {
-    problem_ = out_of_space(free_bytes(store_.folder_), entry_->record.length - at_);
+    problem_ = store_.problem_of(errno, entry_->record.length - at_);
     return false;
   }
   at_ += bytes.size();
@@ -368,7 +391,7 @@ bool UploadStore::Writer::write(std::span<const std::byte> bytes) {
 }
 
 // Keeps what came, or goes back to where the body began; either way to the disk, and the offset with it.
-void UploadStore::Writer::settle(bool keep) {
+bool UploadStore::Writer::settle(bool keep) {
   settled_ = true;
   const std::uint64_t offset = keep ? at_ : begin_;
   bool is_safe = file_.is_open();
@@ -377,23 +400,24 @@ void UploadStore::Writer::settle(bool keep) {
   is_safe = is_safe && ::fdatasync(file_.get()) == 0;
   // Came the mark back after a loss of power, what is told now would be cut off again.
   if (is_safe && checksum_) is_safe = drop_mark(store_.folder_, entry_->record.id);
+  if (!is_safe && file_.is_open()) problem_ = store_.problem_of(errno, entry_->record.length - begin_);
   const std::lock_guard lock(*entry_->mutex);
   if (is_safe) {
     entry_->offset = offset;
     entry_->changed = system_clock::now();
   }
   entry_->is_held = false;
+  return is_safe;
 }
 
 Outcome<UploadStatus> UploadStore::Writer::finish() {
   if (checksum_ && digest_.finish() != checksum_->digest) {
-    settle(false);
+    if (!settle(false)) return problem_;
     return Problem{.kind = ProblemKind::kChecksumMismatch,
                    .detail = "the bytes do not have that checksum; the upload stands where it stood"};
   }
-  settle(true);
+  if (!settle(true)) return problem_;
   const std::lock_guard lock(*entry_->mutex);
-  if (entry_->offset != at_) return out_of_space(free_bytes(store_.folder_), entry_->record.length - begin_);
   is_finished_ = true;
   return store_.status_of(*entry_);
 }

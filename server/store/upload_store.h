@@ -1,11 +1,11 @@
 #pragma once
 // Resumable uploads: bytes on disk, never in memory, that survive the client's connection and the daemon.
 
-#include <sys/types.h>
-
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -45,9 +45,11 @@ class UploadStore {
   struct Entry;
 
  public:
-  /// Removes what is expired or damaged, now and from time to time.
-  /// `jobs`: a folder whose folders may have links to uploads; empty: there is none
-  UploadStore(const Limits& limits, std::string folder, std::string jobs = {});
+  /// Whether the open file, which has another name as well, is a cloud's that is kept.
+  using IsImported = std::function<bool(int file)>;
+
+  /// Removes what is expired, damaged or imported, now and from time to time.
+  UploadStore(const Limits& limits, std::string folder, const IsImported& is_imported);
   ~UploadStore();
   UploadStore(const UploadStore&) = delete;
   UploadStore& operator=(const UploadStore&) = delete;
@@ -61,7 +63,7 @@ class UploadStore {
     bool write(std::span<const std::byte> bytes) override;
     [[nodiscard]] protocol::Problem problem() const override { return problem_; }
     /// The body is complete: checks its checksum, brings it to the disk. Afterwards the offset counts.
-    /// Problems: checksum mismatch, out of space
+    /// Problems: checksum mismatch, out of space, storage failed
     Outcome<UploadStatus> finish();
     /// The upload was made for this body: it goes with it where it is not finished.
     void begins_upload() { is_new_ = true; }
@@ -70,7 +72,8 @@ class UploadStore {
     friend class UploadStore;
     Writer(UploadStore& store, std::shared_ptr<Entry> entry, std::optional<UploadChecksum> checksum);
     bool open();
-    void settle(bool keep);
+    /// False: the offset stays where it was, and problem_ says why.
+    bool settle(bool keep);
 
     UploadStore& store_;
     std::shared_ptr<Entry> entry_;
@@ -86,16 +89,21 @@ class UploadStore {
   };
 
   /// A new upload. `record`: all but id and time.
-  /// Problems: too many, too large, out of space (with the bytes that are free)
+  /// Problems: too many, too large, out of space (with the bytes that are free), overloaded (no descriptors);
+  /// storage failed, from then on for every call that writes
   Outcome<UploadStatus> create(UploadRecord record);
   /// A writer of `length` bytes from `offset` on.
-  /// Problems: not found, locked, offset mismatch, too large
+  /// Problems: not found, locked, offset mismatch, too large, and those of create()
   Outcome<std::shared_ptr<Writer>> write(const std::string& id, std::uint64_t offset, std::uint64_t length,
                                          std::optional<UploadChecksum> checksum);
   [[nodiscard]] std::optional<UploadStatus> find(const std::string& id) const;
   [[nodiscard]] std::vector<UploadStatus> list() const;  ///< oldest first
-  /// Problems: not found, locked
+  /// It does not come back after a loss of power.
+  /// Problems: not found, locked, storage failed (it is gone, but may come back)
   Outcome<Done> remove(const std::string& id);
+
+  /// Whether the disk has failed: nothing is written any more.
+  [[nodiscard]] bool has_failed() const { return failed_; }
 
   /// A complete upload's file while it is imported: nobody writes or removes it meanwhile.
   class Lease {
@@ -118,17 +126,19 @@ class UploadStore {
  private:
   [[nodiscard]] UploadStatus status_of(const Entry& entry) const;
   [[nodiscard]] std::shared_ptr<Entry> find_locked(const std::string& id) const;
-  void load();
-  bool load_one(const std::string& id);
+  void load(const IsImported& is_imported);
+  bool load_one(const std::string& id, const IsImported& is_imported);
   void remove_files(const std::string& id) const;
   void sweep();
   void sweep_until_stopped();
+  /// What a client is told of a call on the files that failed with that errno.
+  protocol::Problem problem_of(int number, std::uint64_t wanted);
   [[nodiscard]] std::optional<protocol::Problem> check_room_locked(const UploadRecord& record) const;
 
   const Limits limits_;
   const std::string folder_;
-  std::map<ino_t, nlink_t> job_links_;  // of uploads that jobs read, while they are loaded
-  mutable std::mutex mutex_;            // guards all below and the entries
+  std::atomic<bool> failed_ = false;
+  mutable std::mutex mutex_;  // guards all below and the entries
   std::condition_variable stopping_changed_;
   bool stopping_ = false;
   std::map<std::string, std::shared_ptr<Entry>> entries_;

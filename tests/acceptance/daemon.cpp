@@ -24,11 +24,20 @@ std::string text_of(const std::string& path) {
   return text.str();
 }
 
-pid_t start(const std::vector<std::string>& command, const std::string& out, const std::string& err) {
-  std::vector<char*> arguments;
-  for (const std::string& argument : command)
-    arguments.push_back(const_cast<char*>(argument.c_str()));  // NOLINT: execv's API
+/// As execve() takes them; they live as long as the strings.
+std::vector<char*> pointers_to(const std::vector<std::string>& strings) {
+  std::vector<char*> pointers;
+  for (const std::string& text : strings) pointers.push_back(const_cast<char*>(text.c_str()));  // NOLINT
+  return pointers;
+}
+
+pid_t start(const std::vector<std::string>& command, const std::string& out, const std::string& err,
+            const std::vector<std::string>& environment = {}) {
+  std::vector<char*> arguments = pointers_to(command);
   arguments.push_back(nullptr);
+  std::vector<char*> variables = pointers_to(environment);
+  for (char** variable = environ; *variable != nullptr; ++variable) variables.push_back(*variable);
+  variables.push_back(nullptr);
   const pid_t child = ::fork();
   if (child < 0) throw std::runtime_error("cannot fork");
   if (child > 0) return child;
@@ -36,7 +45,7 @@ pid_t start(const std::vector<std::string>& command, const std::string& out, con
   const int err_file = ::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   ::dup2(out_file, 1);
   ::dup2(err_file, 2);
-  ::execv(arguments[0], arguments.data());
+  ::execve(arguments[0], arguments.data(), variables.data());
   ::_exit(127);
 }
 
@@ -112,10 +121,10 @@ Reply parse_reply(const std::string& bytes) {
   return reply;
 }
 
-Daemon::Daemon(std::vector<std::string> arguments) {
+Daemon::Daemon(const std::vector<std::string>& arguments, const std::vector<std::string>& environment) {
   std::vector<std::string> command = {POINTWRIGHTD_PATH, "--port", "0", "--port-file", folder_ / "port"};
   command.insert(command.end(), arguments.begin(), arguments.end());
-  pid_ = start(command, folder_ / "out", folder_ / "err");
+  pid_ = start(command, folder_ / "out", folder_ / "err", environment);
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
   while (port_ == 0) {
     const std::string text = text_of(folder_ / "port");

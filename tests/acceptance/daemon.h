@@ -46,8 +46,10 @@ struct Reply {
 
 class Daemon {
  public:
-  /// Starts it with further arguments and waits until it answers.
-  explicit Daemon(std::vector<std::string> arguments = {});
+  /// Starts it with further arguments, and "NAME=value" beside the environment of the test, and waits until
+  /// it answers. Throws std::runtime_error with its log where it does not.
+  explicit Daemon(const std::vector<std::string>& arguments = {},
+                  const std::vector<std::string>& environment = {});
   ~Daemon();
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
