@@ -1,6 +1,6 @@
 // The reliability battery: a daemon of our own under hostile bytes, slow and vanishing clients, and load.
 //
-//   node tests/battery/run.mjs [--scale S] [--seed N] [hostile|connections|load|durability …]
+//   node tests/battery/run.mjs [--scale S] [--seed N] [hostile|tls|connections|load|durability …]
 //
 // S scales how much is sent: 1 is the full battery (about a quarter of an hour), 0.02 what `make test` runs. POINTWRIGHTD
 // names another build's daemon, a sanitizer's say. Exit status: 0 where every check holds.
@@ -9,8 +9,9 @@ import { connections } from "./connections.mjs";
 import { durability } from "./durability.mjs";
 import { hostile } from "./hostile.mjs";
 import { load } from "./load.mjs";
+import { tls } from "./tls.mjs";
 
-const parts = { hostile, connections, load, durability };
+const parts = { hostile, tls, connections, load, durability };
 const { values, positionals } = parseArgs({
   allowPositionals: true,
   options: { scale: { type: "string", default: "1" }, seed: { type: "string", default: "1" } },
