@@ -64,6 +64,7 @@ Outcome<SharedFile> write_file(Service& service, const std::function<std::shared
 const std::vector<Format>& cloud_file_formats() {
   static const std::vector<Format> formats = [] {
     std::vector<Format> all;
+    all.reserve(kFileTypes.size());
     for (const FileType& type : kFileTypes)
       all.push_back(
           {.name = format_name(type.format), .media_type = type.media_type, .extension = type.extension});

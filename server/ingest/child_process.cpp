@@ -109,6 +109,7 @@ std::optional<pid_t> start_child(const ChildPlan& wanted) {
   if (!plan.good) return std::nullopt;
   std::vector<std::string> texts = wanted.arguments;
   std::vector<char*> arguments;
+  arguments.reserve(texts.size() + 1);
   for (std::string& text : texts) arguments.push_back(text.data());
   arguments.push_back(nullptr);
   std::vector<char*> environment = child_environment(wanted.inherits_environment);
