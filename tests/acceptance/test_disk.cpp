@@ -74,12 +74,12 @@ std::string place_in(const Reply& reply) {
 }
 
 const std::string& sheet() {
-  static const std::string kFile = file_of(wavy_sheet(30));
-  return kFile;
+  static const std::string file = file_of(wavy_sheet(30));
+  return file;
 }
 const std::string& other_sheet() {
-  static const std::string kFile = file_of(wavy_sheet(25));
-  return kFile;
+  static const std::string file = file_of(wavy_sheet(25));
+  return file;
 }
 
 using Step = std::function<Reply(Telling&)>;
@@ -96,8 +96,8 @@ Step continue_upload(std::size_t begin, std::size_t end) {
 
 /// The story: each step is one change that the daemon acknowledges.
 const std::vector<Step>& story() {
-  static const std::size_t kHalf = other_sheet().size() / 2;
-  static const std::vector<Step> kSteps{
+  static const std::size_t half = other_sheet().size() / 2;
+  static const std::vector<Step> steps{
       [](Telling& telling) {
         Reply reply = ask(telling.daemon, "POST", "/v1/clouds?name=test", sheet(),
                           "Content-Type: application/octet-stream\r\n");
@@ -124,8 +124,8 @@ const std::vector<Step>& story() {
         telling.upload = place_in(reply);
         return reply;
       },
-      continue_upload(0, kHalf),
-      continue_upload(kHalf, other_sheet().size()),
+      continue_upload(0, half),
+      continue_upload(half, other_sheet().size()),
       [](Telling& telling) {
         const std::string id = telling.upload.substr(telling.upload.rfind('/') + 1);
         return ask(telling.daemon, "POST", "/v1/clouds", R"({"upload":")" + id + "\"}");
@@ -143,7 +143,7 @@ const std::vector<Step>& story() {
       on_session("DELETE", "", ""),
       [](Telling& telling) { return ask(telling.daemon, "DELETE", "/v1/clouds/" + telling.cloud); },
   };
-  return kSteps;
+  return steps;
 }
 
 /// A member of an answer; null where the daemon is gone.
@@ -182,7 +182,7 @@ struct Course {
 };
 
 const Course& course() {
-  static const Course kCourse = [] {
+  static const Course course = [] {
     Course course;
     FaultyDisk disk;
     Daemon daemon(disk.arguments(), disk.environment());
@@ -198,7 +198,7 @@ const Course& course() {
     course.write_count = disk.page().write_count;
     return course;
   }();
-  return kCourse;
+  return course;
 }
 
 /// How a telling ended: how many steps were acknowledged, and the first answer that was not.
