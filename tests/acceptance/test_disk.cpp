@@ -182,7 +182,7 @@ struct Course {
 };
 
 const Course& course() {
-  static const Course course = [] {
+  static const Course taken = [] {
     Course course;
     FaultyDisk disk;
     Daemon daemon(disk.arguments(), disk.environment());
@@ -198,7 +198,7 @@ const Course& course() {
     course.write_count = disk.page().write_count;
     return course;
   }();
-  return course;
+  return taken;
 }
 
 /// How a telling ended: how many steps were acknowledged, and the first answer that was not.
