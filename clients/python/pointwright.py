@@ -1642,7 +1642,10 @@ class Job:
         """Writes a file that the job made, the first one where no name is given; returns its bytes."""
         for result in self.results()["results"]:
             if name is None or result["name"] == name:
-                return _save(self.client.request("GET", result["href"], stream=True), target)
+                count = _save(self.client.request("GET", result["href"], stream=True), target)
+                if count != result["bytes"]:
+                    raise Unreachable(f"the result came in part only: {count} of {result['bytes']} bytes")
+                return count
         raise ValueError(f"the job has made no {name or 'file'}")
 
     def delete(self) -> None:

@@ -395,11 +395,15 @@ TEST_CASE("a job that cannot be is refused with what is wrong; as many as may be
   refused({{"session", lifted.session}, {"output", {{"format", "obj"}}}}, "/output/format");
   refused({{"session", lifted.session}, {"preview", {{"count", 1000}}}}, "/preview");
   refused({{"session", lifted.session}, {"s", 2}}, "/s");
-  json image = recipe;
-  image["edits"][0]["zero"]["operations"] = {
-      {{"mode", "add"}, {"shape", {{"type", "cloud"}, {"cloud", lifted.cloud}, {"within", 0.1}}}}};
-  const Reply named = daemon.ask("POST", "/v1/jobs", json{{"recipe", image}, {"cloud", lifted.cloud}}.dump());
-  CHECK(named.status == 422);
+  json model = recipe;
+  model["edits"][0]["zero"]["operations"] =
+      json::array({json{{"mode", "add"},
+                        {"shape",
+                         {{"type", "model"},
+                          {"cloud", lifted.cloud},
+                          {"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}},
+                          {"thickness", 0.1}}}}});
+  refused({{"recipe", model}, {"cloud", lifted.cloud}}, "/recipe/edits/0/zero/operations/0/shape/type");
   CHECK(daemon.get("/v1/jobs").json()["jobs"].empty());
 
   const json first = submit(daemon, {{"session", lifted.session}, {"launcher", "held"}});
