@@ -28,7 +28,7 @@ inline constexpr std::array kJobFormats = {CloudFormat::kPly, CloudFormat::kLas,
                                            CloudFormat::kXyz};
 inline constexpr std::uint64_t kHighestPriority = 9;
 inline constexpr std::uint64_t kUsualPriority = 5;
-inline constexpr std::uint64_t kMostSteps = 1000;
+inline constexpr std::uint64_t kMostSteps = 1000;        ///< of an animation
 inline constexpr std::uint64_t kUsualPreview = 100'000;  ///< samples of a preview that a job makes itself
 inline constexpr std::string_view kLocalLauncher = "local";
 

@@ -17,6 +17,7 @@
 
 #include "engine/core/parallel.h"
 #include "protocol/json/documents.h"
+#include "protocol/json/jobs.h"
 #include "protocol/json/parse.h"
 #include "server/cli/local_file.h"
 #include "server/ingest/files.h"
@@ -32,7 +33,7 @@ using protocol::ProblemKind;
 namespace {
 
 constexpr std::uint64_t kMostRecipeBytes = std::uint64_t{1} << 30U;
-constexpr std::array<std::string_view, 3> kModeNames{"tiles", "memory", "direct"};
+constexpr auto& kModeNames = protocol::kJobModeNames;  // in the order of JobMode
 
 /// Says why the job cannot be done; for events as a document, too.
 class Refusal {
@@ -251,7 +252,7 @@ CLI::App* add_job_run(CLI::App& group, JobRunOptions& options) {
       ->add_option("--steps", options.steps,
                    "an animation: so many clouds from s = 0 up to s, beside the result's name as "
                    "name_0001.ply, name_0002.ply and so on")
-      ->check(CLI::Range(2U, kMaxJobSteps));
+      ->check(CLI::Range(std::uint64_t{2}, protocol::kMostSteps));
   command->add_option("--neighbors", options.neighbors, "of a sample's neighbourhood, 4 to 32")
       ->check(CLI::Range(4U, 32U))
       ->capture_default_str();

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "server/handlers/event_stream.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/query.h"
 #include "server/handlers/session_news.h"
@@ -9,22 +10,6 @@
 
 namespace pointwright::server {
 namespace {
-
-/// After how many milliseconds a client that was cut off should come again.
-constexpr std::string_view kRetry = "retry: 2000\n\n";
-
-bool write_text(BodySink& sink, std::string_view text) {
-  return sink.write(std::as_bytes(std::span(text.data(), text.size())));
-}
-
-/// One event. Its id is the revision that the client then knows.
-bool write_event(BodySink& sink, const protocol::JsonDocument& event, Session::Expected known) {
-  std::string text;
-  if (known) text.append("id: r").append(std::to_string(*known)).append("\n");
-  text.append("event: ").append(event.at("event").get<std::string>());
-  text.append("\ndata: ").append(protocol::to_text(event)).append("\n\n");
-  return write_text(sink, text);
-}
 
 /// What Last-Event-ID says; nothing where it is none of ours.
 Session::Expected last_revision(const RequestHead& head) {
@@ -50,15 +35,13 @@ Response get_events(Service& service, const Request& request) {
     const auto tell = [&sink](const protocol::JsonDocument& event, Session::Expected known) {
       return write_event(sink, event, known);
     };
-    if (!write_text(sink, kRetry)) return;
+    if (!write_retry(sink)) return;
     run_stream(service, viewing, sink,
                {.news = [&] { return news.send(tell); },
-                .heartbeat = [&] { return write_text(sink, ": alive\n\n"); },
+                .heartbeat = [&] { return write_heartbeat(sink); },
                 .end = [&](const std::string& reason) { (void)tell(protocol::end_event(reason), {}); }});
   };
-  Response response{.content_type = "text/event-stream; charset=utf-8", .body = std::move(body)};
-  // Proxies that gather an answer before they pass it on would gather for ever.
-  return response.with_header("Cache-Control", "no-store").with_header("X-Accel-Buffering", "no");
+  return event_stream(std::move(body));
 }
 
 }  // namespace pointwright::server

@@ -17,9 +17,11 @@
 
 #include "engine/io/cloud_io.h"
 #include "server/base/file_types.h"
+#include "server/handlers/event_stream.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/query.h"
 #include "server/handlers/shape_data.h"
+#include "server/handlers/viewing.h"
 #include "server/ingest/files.h"
 #include "server/sessions/recipes.h"
 
@@ -123,11 +125,8 @@ struct SessionPart {
 Outcome<SessionPart> session_part(Service& service, const Caller& caller, const std::string& id) {
   const auto owner = service.sessions.owner_of(id);
   if (!owner || !caller.may_see_session(*owner, id)) return invalid("/session", "there is no such session");
-  auto session = service.sessions.get(id);
+  auto session = session_of(service, id);
   if (!session.ok()) return session.problem();
-  if (session.value()->is_waking())
-    session.value()->wait_until_built(SteadyClock::now() +
-                                      std::chrono::milliseconds(service.config.limits.wake_wait_ms));
   auto exported = computed(service.background, [&] {
     return export_recipe(*session.value(), service.config.limits.max_recipe_bytes);
   });
@@ -192,23 +191,24 @@ Outcome<JobQueue::NewJob> gather(Service& service, const Request& request, proto
     if (auto done = write_text(folder + "/" + JobQueue::kRecipeName, recipe); !done.ok()) return done;
     if (auto done = write_scan(service, *scan, folder + "/" + JobQueue::kInputName); !done.ok()) return done;
     const std::string path = folder + "/" + JobQueue::kPreviewName;
-    if (part->session != nullptr) return write_rest(*part->session, path);
-    if (preview == nullptr) return Done{};
-    const auto samples = service.clouds.samples_of(*preview);
-    return samples.ok() ? write_ply(*samples.value(), path) : samples.problem();
+    const auto written = computed(service.background, [&]() -> Outcome<Done> {
+      if (part->session != nullptr) return write_rest(*part->session, path);
+      if (preview == nullptr) return Done{};
+      const auto samples = service.clouds.samples_of(*preview);
+      return samples.ok() ? write_ply(*samples.value(), path) : samples.problem();
+    });
+    return written.ok() ? written.value() : written.problem();
   };
   return job;
 }
 
-bool write_event(BodySink& sink, const protocol::JobDocument& job) {
-  const std::string text =
-      std::string("event: job\ndata: ").append(protocol::to_text(protocol::job_event(job))).append("\n\n");
-  return sink.write(std::as_bytes(std::span(text.data(), text.size())));
-}
-
-Response file_response(const std::string& path, const protocol::JobResult& result, const std::string& name) {
+Response file_response(const Request& request, const std::string& path, const protocol::JobResult& result,
+                       const std::string& name) {
   const auto file =
       std::make_shared<const Descriptor>(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+  if (!file->is_open())
+    return problem_response(
+        {.kind = ProblemKind::kInternalError, .detail = "the result cannot be read from the disk"}, request);
   Response response{.content_type = result.media_type};
   response.body = [file](BodySink& sink) {
     std::vector<std::byte> piece(kFilePiece);
@@ -327,7 +327,7 @@ Response get_job_result(Service& service, const Request& request) {
     if (result.name == request.captures.at(1)) {
       if (const std::string etag = etag_of({result.sha256}); is_unchanged(request.head, etag))
         return not_modified(etag);
-      return file_response(service.jobs.result_path(job->id, result.name), result, job->terms.name);
+      return file_response(request, service.jobs.result_path(job->id, result.name), result, job->terms.name);
     }
   return problem_response({.kind = ProblemKind::kNotFound, .detail = "the job has no such result"}, request);
 }
@@ -335,27 +335,19 @@ Response get_job_result(Service& service, const Request& request) {
 Response get_job_events(Service& service, const Request& request) {
   const std::string id = request.captures.at(0);
   if (!service.jobs.find(id)) return no_such_job(request);
-  auto quota = service.access.hold(request.caller, Quota::kStreams, 1);
-  if (!quota.ok()) return problem_response(quota.problem(), request);
-  auto slot = service.streams.hold(1);
-  if (slot == nullptr)
-    return problem_response({.kind = ProblemKind::kOverloaded,
-                             .detail = "all streams are in use",
-                             .limit = static_cast<double>(service.streams.total())},
-                            request);
-  StreamBody body = [&service, id, head = request.head, slot = std::move(slot),
-                     quota = std::move(quota.value())](BodySink& sink) {
+  auto stream = admit_stream(service, request);
+  if (!stream.ok()) return problem_response(stream.problem(), request);
+  StreamBody body = [&service, id, head = request.head, stream = std::move(stream.value())](BodySink& sink) {
     const std::chrono::milliseconds heartbeat(service.config.limits.heartbeat_ms);
-    constexpr std::string_view kAlive = ": alive\n\n";
     std::uint64_t seen = 0;
     bool is_news = true;
     auto beat = SteadyClock::now() + heartbeat;
     while (!sink.is_peer_gone() && !sink.is_stopping()) {
       const auto job = service.jobs.find(id);
-      if (!job || (is_news && !write_event(sink, *job)) || job->has_ended()) return;
+      if (!job || (is_news && !write_event(sink, protocol::job_event(*job))) || job->has_ended()) return;
       if (SteadyClock::now() >= beat) {
         if (!service.access.identify(head).ok()) return;
-        if (!sink.write(std::as_bytes(std::span(kAlive.data(), kAlive.size())))) return;
+        if (!write_heartbeat(sink)) return;
         beat = SteadyClock::now() + heartbeat;
       }
       const auto changes = service.jobs.wait_beyond(id, seen, SteadyClock::now() + kPollInterval);
@@ -364,8 +356,7 @@ Response get_job_events(Service& service, const Request& request) {
       seen = *changes;
     }
   };
-  Response response{.content_type = "text/event-stream; charset=utf-8", .body = std::move(body)};
-  return response.with_header("Cache-Control", "no-store").with_header("X-Accel-Buffering", "no");
+  return event_stream(std::move(body));
 }
 
 }  // namespace pointwright::server

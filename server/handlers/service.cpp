@@ -165,7 +165,11 @@ Response json_response(const protocol::JsonDocument& document, int status) {
 }
 
 Outcome<std::shared_ptr<Session>> session_of(Service& service, const Request& request) {
-  auto session = service.sessions.get(request.captures.at(0));
+  return session_of(service, request.captures.at(0));
+}
+
+Outcome<std::shared_ptr<Session>> session_of(Service& service, const std::string& id) {
+  auto session = service.sessions.get(id);
   if (session.ok() && session.value()->is_waking())
     session.value()->wait_until_built(std::chrono::steady_clock::now() +
                                       std::chrono::milliseconds(service.config.limits.wake_wait_ms));

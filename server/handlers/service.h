@@ -96,6 +96,8 @@ Response json_response(const protocol::JsonDocument& document, int status = 200)
 /// The session that the first capture names; a problem where there is none. One that is brought back is
 /// waited for, but not for ever.
 Outcome<std::shared_ptr<Session>> session_of(Service& service, const Request& request);
+/// The same by its id.
+Outcome<std::shared_ptr<Session>> session_of(Service& service, const std::string& id);
 
 /// How the answer to a request is kept together with its effect: `make` makes it. Empty where the request has
 /// no Idempotency-Key.

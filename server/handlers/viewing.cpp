@@ -27,11 +27,7 @@ Outcome<std::string> viewer_name(const RequestHead& head) {
 
 }  // namespace
 
-Outcome<Viewing> admit_viewer(Service& service, const Request& request) {
-  auto session = service.sessions.get(request.captures.at(0));
-  if (!session.ok()) return session.problem();
-  auto name = viewer_name(request.head);
-  if (!name.ok()) return name.problem();
+Outcome<StreamSlot> admit_stream(Service& service, const Request& request) {
   auto quota = service.access.hold(request.caller, Quota::kStreams, 1);
   if (!quota.ok()) return quota.problem();
   auto slot = service.streams.hold(1);
@@ -39,11 +35,21 @@ Outcome<Viewing> admit_viewer(Service& service, const Request& request) {
     return Problem{.kind = ProblemKind::kOverloaded,
                    .detail = "all streams are in use",
                    .limit = static_cast<double>(service.streams.total())};
+  return StreamSlot(
+      std::make_shared<const StreamSlot::element_type>(std::move(quota.value()), std::move(slot)));
+}
+
+Outcome<Viewing> admit_viewer(Service& service, const Request& request) {
+  auto session = service.sessions.get(request.captures.at(0));
+  if (!session.ok()) return session.problem();
+  auto name = viewer_name(request.head);
+  if (!name.ok()) return name.problem();
+  auto slot = admit_stream(service, request);
+  if (!slot.ok()) return slot.problem();
   return Viewing{.session = std::move(session.value()),
                  .head = request.head,
                  .name = std::move(name.value()),
-                 .slot = std::move(slot),
-                 .quota = std::move(quota.value())};
+                 .slot = std::move(slot.value())};
 }
 
 void run_stream(Service& service, const Viewing& viewing, BodySink& sink, const StreamVoice& voice) {

@@ -4,17 +4,23 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "server/handlers/service.h"
 
 namespace pointwright::server {
+
+/// A part of the streams that may be open, of the caller's and of all.
+using StreamSlot = std::shared_ptr<const std::pair<QuotaHold, std::shared_ptr<Budget::Hold>>>;
+/// Problems: too many, overloaded
+Outcome<StreamSlot> admit_stream(Service& service, const Request& request);
 
 /// Somebody who was let in to look at a session. Copies share what is held.
 struct Viewing {
   std::shared_ptr<Session> session;
   RequestHead head;  ///< with the credentials that let them in
   std::string name;  ///< ?viewer=
-  std::shared_ptr<const void> slot, quota;
+  StreamSlot slot;
 };
 /// Lets a viewer in to the session that the first capture names; one that is brought back is not waited for.
 /// Problems: those of SessionStore::get(); invalid value (the name), too many, overloaded

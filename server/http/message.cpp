@@ -46,4 +46,9 @@ std::string RequestHead::media_type() const {
   return type;
 }
 
+Response& Response::with_header(std::string name, std::string value) {
+  headers.emplace_back(std::move(name), std::move(value));
+  return *this;
+}
+
 }  // namespace pointwright::server

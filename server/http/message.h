@@ -96,10 +96,7 @@ struct Response {
   /// Server-Timing entries: name and milliseconds.
   std::vector<std::pair<std::string, double>> timings = {};
 
-  Response& with_header(std::string name, std::string value) {
-    headers.emplace_back(std::move(name), std::move(value));
-    return *this;
-  }
+  Response& with_header(std::string name, std::string value);
 };
 
 /// A request that is answered once, however often it comes.

@@ -27,12 +27,6 @@ namespace {
 using protocol::Problem;
 using protocol::ProblemKind;
 
-bool resamples(const protocol::RecipeRequest& request) {
-  return std::ranges::any_of(request.recipe.edits, [](const protocol::RecipeEdit& edit) {
-    return edit.edit.resampling.has_value();
-  });
-}
-
 /// What the edits made of a cloud, whichever way.
 struct Edited {
   std::shared_ptr<const Sampling> sampling;
@@ -192,65 +186,6 @@ std::vector<std::string> outputs_of(const JobParams& params) {
     names.push_back(name.string());
   }
   return names;
-}
-
-namespace {
-
-Problem invalid(const char* detail) {
-  return {.kind = ProblemKind::kInvalidValue, .detail = detail};
-}
-
-/// What no mode can do.
-std::optional<Problem> check(const JobParams& params) {
-  if (params.steps && (*params.steps < 2 || *params.steps > kMaxJobSteps))
-    return Problem{
-        .kind = ProblemKind::kInvalidValue,
-        .detail = std::string("steps must lie between 2 and ").append(std::to_string(kMaxJobSteps)),
-        .limit = static_cast<double>(kMaxJobSteps),
-        .actual = static_cast<double>(*params.steps)};
-  if (params.steps && params.mode == JobMode::kDirect)
-    return invalid("steps are made in tiles or in memory, not in the mode direct");
-  std::error_code ignored;
-  for (const std::string& output : outputs_of(params)) {
-    if (std::filesystem::equivalent(params.input, output, ignored))
-      return invalid("a job does not write over its own input");
-    if (std::filesystem::is_directory(output, ignored)) return invalid("the output is a folder");
-  }
-  const std::string folder = std::filesystem::path(params.output).parent_path().string();
-  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
-    return Problem{.kind = ProblemKind::kInvalidValue,
-                   .detail = std::string("the output cannot be written: ")
-                                 .append(folder.empty() ? "." : folder)
-                                 .append(": ")
-                                 .append(std::system_category().message(errno))};
-  return std::nullopt;
-}
-
-}  // namespace
-
-Outcome<ChosenMode> choose_mode(const JobParams& params) {
-  if (auto problem = check(params)) return *problem;
-  const bool splits = resamples(params.request);
-  if (params.mode && *params.mode != JobMode::kTiles)
-    return ChosenMode{.mode = *params.mode, .file = {}, .records = {}};
-  if (splits && params.mode)
-    return invalid("edits with resampling are not made in tiles: use the mode memory or direct");
-  if (splits) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
-  auto file = MappedFile::open(params.input);
-  if (!file) return protocol::to_problem(file.error());
-  auto records = ScanRecords::of(file.value().bytes());
-  if (!records) return protocol::to_problem(records.error());
-  const auto wanted = format_of_name(params.output);
-  if (!wanted) return protocol::to_problem(wanted.error());
-  const bool fits = records.value().has_value() && records.value()->format == wanted.value();
-  if (fits)
-    return ChosenMode{.mode = JobMode::kTiles, .file = std::move(file).value(), .records = *records.value()};
-  if (!params.mode) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
-  return Problem{
-      .kind = ProblemKind::kUnsupportedFormat,
-      .detail =
-          "in tiles are read binary PLY, whose vertices have no lists, and LAS, and written as what "
-          "they were: use the mode memory"};
 }
 
 Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionContext& context,

@@ -40,13 +40,12 @@ struct JobParams {
   /// Scans that are not read as records are decoded in a confined process of at most `most_bytes`
   /// (server/ingest/confined.h). The program must know kDecodeChildArgument.
   bool confined = false;
-  std::uint64_t most_bytes = 0;  ///< of memory, for the report and the decoder; 0: all
+  std::uint64_t most_bytes = 0;  ///< of memory, for the decoder; 0: as much as it wants
   bool drop_non_finite = false;  ///< in the modes memory and direct
   Team* team = nullptr;          ///< who does it together; null: this process alone
-  /// An animation: so many clouds, 2 to kMaxJobSteps, of the recipe at s = 0 up to request.s in even steps.
+  /// An animation: so many clouds, 2 to protocol::kMostSteps, of the recipe at s = 0 up to request.s in even steps.
   std::optional<std::uint32_t> steps = std::nullopt;
 };
-inline constexpr std::uint32_t kMaxJobSteps = 1000;
 
 /// What the job writes: its output, or of an animation to edited.ply edited_0001.ply and so on.
 std::vector<std::string> outputs_of(const JobParams& params);

@@ -1,20 +1,28 @@
 #include "server/jobs/scan_source.h"
 
 #include <fcntl.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <limits>
+#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "engine/io/decoded_cloud.h"
+#include "protocol/json/jobs.h"
 #include "server/base/descriptor.h"
 #include "server/cli/local_file.h"
 #include "server/ingest/confined.h"
 #include "server/ingest/files.h"
 
 namespace pointwright::server {
+
+using protocol::Problem;
+using protocol::ProblemKind;
 
 Result<ImportedCloud> read_scan(const JobParams& params) {
   const ImportParams import{.max_samples = std::numeric_limits<std::uint32_t>::max() - 1U,
@@ -44,6 +52,71 @@ Result<ImportedCloud> read_scan(const JobParams& params) {
   auto decoded = decode_confined(file.get(), size, format.value(), import, confine, nullptr);
   if (!decoded) return decoded.error();
   return finish_cloud(std::move(decoded).value(), import);
+}
+
+namespace {
+
+bool resamples(const protocol::RecipeRequest& request) {
+  return std::ranges::any_of(request.recipe.edits, [](const protocol::RecipeEdit& edit) {
+    return edit.edit.resampling.has_value();
+  });
+}
+
+Problem invalid(const char* detail) {
+  return {.kind = ProblemKind::kInvalidValue, .detail = detail};
+}
+
+/// What no mode can do.
+std::optional<Problem> check(const JobParams& params) {
+  if (params.steps && (*params.steps < 2 || *params.steps > protocol::kMostSteps))
+    return Problem{
+        .kind = ProblemKind::kInvalidValue,
+        .detail = std::string("steps must lie between 2 and ").append(std::to_string(protocol::kMostSteps)),
+        .limit = static_cast<double>(protocol::kMostSteps),
+        .actual = static_cast<double>(*params.steps)};
+  if (params.steps && params.mode == JobMode::kDirect)
+    return invalid("steps are made in tiles or in memory, not in the mode direct");
+  std::error_code ignored;
+  for (const std::string& output : outputs_of(params)) {
+    if (std::filesystem::equivalent(params.input, output, ignored))
+      return invalid("a job does not write over its own input");
+    if (std::filesystem::is_directory(output, ignored)) return invalid("the output is a folder");
+  }
+  const std::string folder = std::filesystem::path(params.output).parent_path().string();
+  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+    return Problem{.kind = ProblemKind::kInvalidValue,
+                   .detail = std::string("the output cannot be written: ")
+                                 .append(folder.empty() ? "." : folder)
+                                 .append(": ")
+                                 .append(std::system_category().message(errno))};
+  return std::nullopt;
+}
+
+}  // namespace
+
+Outcome<ChosenMode> choose_mode(const JobParams& params) {
+  if (auto problem = check(params)) return *problem;
+  const bool splits = resamples(params.request);
+  if (params.mode && *params.mode != JobMode::kTiles)
+    return ChosenMode{.mode = *params.mode, .file = {}, .records = {}};
+  if (splits && params.mode)
+    return invalid("edits with resampling are not made in tiles: use the mode memory or direct");
+  if (splits) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
+  auto file = MappedFile::open(params.input);
+  if (!file) return protocol::to_problem(file.error());
+  auto records = ScanRecords::of(file.value().bytes());
+  if (!records) return protocol::to_problem(records.error());
+  const auto wanted = format_of_name(params.output);
+  if (!wanted) return protocol::to_problem(wanted.error());
+  const bool fits = records.value().has_value() && records.value()->format == wanted.value();
+  if (fits)
+    return ChosenMode{.mode = JobMode::kTiles, .file = std::move(file).value(), .records = *records.value()};
+  if (!params.mode) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
+  return Problem{
+      .kind = ProblemKind::kUnsupportedFormat,
+      .detail =
+          "in tiles are read binary PLY, whose vertices have no lists, and LAS, and written as what "
+          "they were: use the mode memory"};
 }
 
 }  // namespace pointwright::server

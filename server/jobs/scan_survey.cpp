@@ -8,10 +8,12 @@
 #include <span>
 #include <string>
 
+#include "engine/core/check.h"
 #include "engine/core/mixed_bits.h"
 #include "engine/core/parallel.h"
 #include "engine/io/cloud_io.h"
 #include "engine/spatial/coherent_order.h"
+#include "server/jobs/raw_bytes.h"
 
 namespace pointwright::server {
 namespace {
@@ -58,21 +60,12 @@ struct Told {
   std::uint64_t chosen = 0;
 };
 
-template <typename T>
-void append(std::vector<std::byte>& bytes, const std::vector<T>& values) {
-  const std::size_t at = bytes.size();
-  bytes.resize(at + values.size() * sizeof(T));
-  if (!values.empty())
-    std::memcpy(bytes.data() + at, static_cast<const void*>(values.data()), values.size() * sizeof(T));
-}
-
-/// Takes so many values off the front.
+/// Takes so many values off the front. Pre: one of the team has put them there.
 template <typename T>
 void take(std::span<const std::byte>& bytes, std::size_t count, std::vector<T>& to) {
   const std::size_t at = to.size();
   to.resize(at + count);
-  if (count > 0) std::memcpy(static_cast<void*>(to.data() + at), bytes.data(), count * sizeof(T));
-  bytes = bytes.subspan(count * sizeof(T));
+  POINTWRIGHT_CHECK(take_raw(bytes, to.data() + at, count), "a part of the survey that is not whole");
 }
 
 }  // namespace
@@ -126,14 +119,15 @@ Result<ScanSurvey> survey(const MappedFile& file, const ScanRecords& records, st
     file.release(records.begin + chunk * records.record_bytes, records.begin + end * records.record_bytes);
   }
   std::vector<std::byte> said;
-  append(said, std::vector<Told>{{.min = all.min,
-                                  .max = all.max,
-                                  .first_bad = all.first_bad,
-                                  .digest = all.digest,
-                                  .chosen = mine.chosen.size()}});
-  append(said, mine.chosen);
-  append(said, mine.position);
-  append(said, mine.normal);
+  const Told told{.min = all.min,
+                  .max = all.max,
+                  .first_bad = all.first_bad,
+                  .digest = all.digest,
+                  .chosen = mine.chosen.size()};
+  append_raw(said, &told, 1);
+  append_raw(said, mine.chosen.data(), mine.chosen.size());
+  append_raw(said, mine.position.data(), mine.position.size());
+  append_raw(said, mine.normal.data(), mine.normal.size());
   ScanSurvey result;
   Part together;
   for (const auto& bytes : team.gather(said)) {

@@ -18,6 +18,7 @@
 #include "engine/spatial/coherent_order.h"
 #include "server/base/descriptor.h"
 #include "server/ingest/files.h"
+#include "server/jobs/raw_bytes.h"
 
 namespace pointwright::server {
 namespace {
@@ -30,13 +31,6 @@ constexpr std::size_t kProbes = 64;  // blocks of samples whose neighbourhoods s
 
 Descriptor opened(const std::string& path, int flags) {
   return Descriptor(::open(path.c_str(), flags | O_CLOEXEC, 0600));
-}
-
-template <typename T>
-void append(std::vector<std::byte>& bytes, const T* values, std::size_t count) {
-  const std::size_t at = bytes.size();
-  bytes.resize(at + count * sizeof(T));
-  if (count > 0) std::memcpy(bytes.data() + at, values, count * sizeof(T));
 }
 
 std::string spool_path(const std::string& folder) {
@@ -106,11 +100,11 @@ std::uint64_t TileStore::sample_count(std::size_t tile) const {
 std::vector<std::byte> TileStore::index_bytes() const {
   std::vector<std::byte> bytes;
   const std::array<std::uint64_t, 2> head{kIndexMagic, extents_.size()};
-  append(bytes, head.data(), head.size());
+  append_raw(bytes, head.data(), head.size());
   for (const auto& extents : extents_) {
     const std::uint64_t count = extents.size();
-    append(bytes, &count, 1);
-    append(bytes, extents.data(), extents.size());
+    append_raw(bytes, &count, 1);
+    append_raw(bytes, extents.data(), extents.size());
   }
   return bytes;
 }
@@ -119,21 +113,15 @@ bool TileStore::read_index() {
   const auto bytes = read_file(index_path(folder_), std::uint64_t{1} << 32U);
   if (!bytes) return false;
   std::span<const std::byte> rest = bytes.value();
-  const auto take = [&](void* to, std::size_t size) {
-    if (rest.size() < size) return false;
-    std::memcpy(to, rest.data(), size);
-    rest = rest.subspan(size);
-    return true;
-  };
   std::array<std::uint64_t, 2> head{};
-  if (!take(head.data(), sizeof head) || head[0] != kIndexMagic || head[1] != cuts_.cell_count())
+  if (!take_raw(rest, head.data(), head.size()) || head[0] != kIndexMagic || head[1] != cuts_.cell_count())
     return false;
   std::vector<std::vector<Extent>> extents(cuts_.cell_count());
   for (auto& list : extents) {
     std::uint64_t count = 0;
-    if (!take(&count, sizeof count) || count > rest.size() / sizeof(Extent)) return false;
+    if (!take_raw(rest, &count, 1) || count > rest.size() / sizeof(Extent)) return false;
     list.resize(static_cast<std::size_t>(count));
-    if (!take(list.data(), list.size() * sizeof(Extent))) return false;
+    if (!take_raw(rest, list.data(), list.size())) return false;
   }
   if (!rest.empty()) return false;
   extents_ = std::move(extents);
@@ -378,9 +366,9 @@ Result<void> TileStore::put_result(std::size_t tile, std::size_t step, const Til
   std::vector<std::byte> bytes;
   bytes.reserve(24 + result.moved.size() * sizeof(TileSample) + result.matches.size() * sizeof(PreviewMatch));
   const std::array<std::uint64_t, 3> head{kResultMagic, result.moved.size(), result.matches.size()};
-  append(bytes, head.data(), head.size());
-  append(bytes, result.moved.data(), result.moved.size());
-  append(bytes, result.matches.data(), result.matches.size());
+  append_raw(bytes, head.data(), head.size());
+  append_raw(bytes, result.moved.data(), result.moved.size());
+  append_raw(bytes, result.matches.data(), result.matches.size());
   return write_file_atomically(result_path(tile, step), bytes);
 }
 

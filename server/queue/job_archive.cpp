@@ -8,6 +8,7 @@
 
 #include "server/store/answers.h"
 #include "server/store/archive.h"
+#include "server/store/row_time.h"
 
 namespace pointwright::server {
 
@@ -18,14 +19,6 @@ using protocol::Problem;
 using protocol::TimePoint;
 
 namespace {
-
-std::int64_t to_ms(TimePoint time) {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(time.time_since_epoch()).count();
-}
-
-TimePoint from_ms(std::int64_t ms) {
-  return TimePoint(std::chrono::milliseconds(ms));
-}
 
 std::string terms_row(const KeptJob& job) {
   return protocol::to_text(JsonDocument{{"terms", to_json(job.document.terms)},

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <exception>
 #include <filesystem>
-#include <map>
 #include <system_error>
 #include <utility>
 
+#include "server/base/displaced.h"
 #include "server/base/random_id.h"
 #include "server/ingest/files.h"
 #include "server/queue/worker_process.h"
@@ -145,11 +145,11 @@ Outcome<JobDocument> JobQueue::submit(NewJob job, const Seal<JobDocument>& seal)
   document.progress = {.phase = "waiting", .fraction = 0.0};
   const std::string folder = folder_of(document.id);
   if (auto command = command_of(job.job); !command.ok()) return command.problem();
-  SharedEntry displaced;
+  SharedEntry removed;
   auto outcome = [&]() -> Outcome<JobDocument> {
     if (auto prepared = prepare(job, folder); !prepared.ok()) return prepared.problem();
     const std::lock_guard lock(mutex_);
-    displaced = make_room_locked();
+    removed = make_room_locked();
     if (auto problem = check_locked()) return *problem;
     const auto entry = std::make_shared<Entry>();
     entry->kept = std::move(job.job);
@@ -166,25 +166,16 @@ Outcome<JobDocument> JobQueue::submit(NewJob job, const Seal<JobDocument>& seal)
     return seen;
   }();
   if (!outcome.ok()) remove_folder(folder);
-  if (displaced != nullptr) remove_folder(folder_of(displaced->kept.document.id));
+  if (removed != nullptr) remove_folder(folder_of(removed->kept.document.id));
   return outcome;
 }
 
 JobQueue::SharedEntry JobQueue::make_room_locked() {
   if (stopping_ || entries_.size() < settings_.limits.max_jobs) return nullptr;
-  std::map<std::string, std::size_t> held;
-  for (const SharedEntry& entry : entries_) ++held[entry->kept.owner];
-  SharedEntry chosen;
-  const auto when = [](const Entry& entry) {
-    return entry.kept.document.finished.value_or(entry.kept.document.updated);
-  };
-  for (const SharedEntry& entry : entries_) {
-    if (!entry->kept.document.has_ended() || entry->has_worker) continue;
-    const std::size_t theirs = held[entry->kept.owner];
-    const std::size_t most = chosen == nullptr ? 0 : held[chosen->kept.owner];
-    if (chosen == nullptr || theirs > most || (theirs == most && when(*entry) < when(*chosen)))
-      chosen = entry;
-  }
+  const SharedEntry chosen = displaced(
+      entries_, [](const Entry& entry) { return entry.kept.owner; },
+      [](const Entry& entry) { return entry.kept.document.has_ended() && !entry.has_worker; },
+      [](const Entry& entry) { return entry.kept.document.finished.value_or(entry.kept.document.updated); });
   if (chosen == nullptr || !archive_.remove(chosen->kept.document.id).ok()) return nullptr;
   std::erase(entries_, chosen);
   ++chosen->changes;
@@ -225,6 +216,8 @@ Outcome<JsonDocument> JobQueue::validate(NewJob job) {
                                        const std::lock_guard lock(mutex_);
                                        return stopping_ || SteadyClock::now() > deadline;
                                      });
+    if (end.by_cancel && SteadyClock::now() <= deadline)
+      return Problem{.kind = ProblemKind::kOverloaded, .detail = "the server is stopping"};
     if (end.by_cancel)
       return Problem{.kind = ProblemKind::kTooManySamples,
                      .detail = "the scan could not be looked through in time",
@@ -366,9 +359,7 @@ std::vector<std::string> JobQueue::recover(const std::function<void(KeptJob&)>& 
       end_left_worker(folder.path().string() + "/" + kWorkerPidName);
       remove_folder(folder.path().string());
     }
-  const bool has_work = std::any_of(entries_.begin(), entries_.end(),
-                                    [](const auto& entry) { return !entry->kept.document.has_ended(); });
-  if (has_work || !entries_.empty()) start_runners_locked();
+  if (!entries_.empty()) start_runners_locked();  // those that have ended expire
   return notes;
 }
 
@@ -462,13 +453,15 @@ void JobQueue::run() {
   }
 }
 
-void JobQueue::keep_locked(Entry& entry) {
+bool JobQueue::keep_locked(Entry& entry) {
   // Where the disk takes nothing, the job goes on from its checkpoints after a restart; here it is told of.
-  if (const auto kept = archive_.update(entry.kept); !kept.ok())
+  const auto kept = archive_.update(entry.kept);
+  if (!kept.ok())
     report_failure_("job " + entry.kept.document.id + " cannot be kept: " + kept.problem().detail);
   entry.kept.quota = nullptr;
   ++entry.changes;
   changed_.notify_all();
+  return kept.ok();
 }
 
 }  // namespace pointwright::server

@@ -101,7 +101,7 @@ class JobQueue {
   void run_job(const SharedEntry& entry);
   void take_line(const SharedEntry& entry, const std::string& line, std::string& last);
   void settle(const SharedEntry& entry, const ChildEnd& end, const std::string& last);
-  void keep_locked(Entry& entry);
+  bool keep_locked(Entry& entry);  // whether it could
   void note(const std::string& id, const std::string& text) const;
   [[nodiscard]] SharedEntry take_expired_locked();
   /// Where there are as many as may be: the job that ended longest ago, of whoever holds most; taken out.

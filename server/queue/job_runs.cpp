@@ -131,14 +131,10 @@ void JobQueue::settle(const SharedEntry& entry, const ChildEnd& end, const std::
   std::vector<protocol::JobResult> results;
   if (word.report && end.signal == 0 && end.status == 0) {
     auto made = results_of(folder_of(id), *word.report, job.document.terms);
-    if (made.ok()) {
+    if (made.ok())
       results = std::move(made.value());
-      std::error_code none;  // nobody starts it again
-      for (const char* const name : {kInputName, kPreviewName})
-        std::filesystem::remove(folder_of(id) + "/" + name, none);
-    } else {
+    else
       problem = made.problem();
-    }
   } else {
     problem = problem_of_worker(end, word);
   }
@@ -154,7 +150,11 @@ void JobQueue::settle(const SharedEntry& entry, const ChildEnd& end, const std::
   if (word.report) document.report = *word.report;
   if (document.status == JobStatus::kSuccessful) document.progress = {.phase = "done", .fraction = 1.0};
   note(id, std::string(job_status_name(document.status)).append(": ").append(document.message));
-  keep_locked(*entry);
+  const bool is_kept = keep_locked(*entry);
+  if (!is_kept || document.status != JobStatus::kSuccessful) return;
+  std::error_code none;  // nobody starts it again, not even a daemon that was ended before it knew
+  for (const char* const name : {kInputName, kPreviewName})
+    std::filesystem::remove(folder_of(id) + "/" + name, none);
 }
 
 }  // namespace pointwright::server

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "protocol/json/documents.h"
+#include "server/store/row_time.h"
 
 namespace pointwright::server {
 
@@ -15,12 +16,6 @@ namespace {
 constexpr std::int64_t kKeptMs = 24LL * 60 * 60 * 1000;
 /// So many callers at least share the room for answers.
 constexpr std::uint64_t kCallers = 16;
-
-std::int64_t now_ms() {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 }  // namespace
 

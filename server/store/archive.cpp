@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/base/sha256.h"
+#include "server/store/row_time.h"
 
 namespace pointwright::server {
 
@@ -12,14 +13,6 @@ using protocol::Problem;
 using protocol::ProblemKind;
 
 namespace {
-
-std::int64_t to_ms(protocol::TimePoint time) {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(time.time_since_epoch()).count();
-}
-
-protocol::TimePoint from_ms(std::int64_t ms) {
-  return protocol::TimePoint(std::chrono::milliseconds(ms));
-}
 
 JsonDocument list_of(const std::vector<std::string>& texts) {
   JsonDocument list = JsonDocument::array();

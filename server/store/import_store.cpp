@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <map>
 #include <utility>
 
+#include "server/base/displaced.h"
 #include "server/base/random_id.h"
 
 namespace pointwright::server {
@@ -65,32 +65,21 @@ Outcome<ImportDocument> ImportStore::start(NewImport import, Work work) {
                      .limit = static_cast<double>(token_imports_),
                      .actual = static_cast<double>(under_way + 1)};
     if (entries_.size() >= max_imports_) {
-      const auto displaced = displaced_locked();
-      if (displaced == nullptr)
+      const auto ended = displaced(
+          entries_, [](const Entry& each) { return each.owner; },
+          [](const Entry& each) { return has_ended(each.document); },
+          [](const Entry& each) { return each.ended; });
+      if (ended == nullptr)
         return Problem{.kind = ProblemKind::kTooMany,
                        .detail = "as many imports are under way as may be (max_imports)",
                        .limit = static_cast<double>(max_imports_),
                        .actual = static_cast<double>(entries_.size() + 1)};
-      std::erase(entries_, displaced);
+      std::erase(entries_, ended);
     }
     entries_.push_back(entry);
   }
   pool_.post([this, entry] { run(entry); });
   return begun;
-}
-
-std::shared_ptr<ImportStore::Entry> ImportStore::displaced_locked() const {
-  std::map<std::string, std::size_t> held;
-  for (const auto& entry : entries_) ++held[entry->owner];
-  std::shared_ptr<Entry> chosen;
-  for (const auto& entry : entries_) {
-    if (!has_ended(entry->document)) continue;
-    const std::size_t theirs = held[entry->owner];
-    const std::size_t most = chosen == nullptr ? 0 : held[chosen->owner];
-    if (chosen == nullptr || theirs > most || (theirs == most && entry->ended < chosen->ended))
-      chosen = entry;
-  }
-  return chosen;
 }
 
 void ImportStore::run(const std::shared_ptr<Entry>& entry) {

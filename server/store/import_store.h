@@ -68,8 +68,6 @@ class ImportStore {
   [[nodiscard]] std::shared_ptr<Entry> find_locked(const std::string& id) const;
   [[nodiscard]] static protocol::ImportDocument seen(const Entry& entry);
 
-  [[nodiscard]] std::shared_ptr<Entry> displaced_locked() const;
-
   const std::uint64_t max_imports_;
   const std::uint64_t token_imports_;
   mutable std::mutex mutex_;  // guards what follows

@@ -8,6 +8,7 @@
 
 #include "protocol/json/requests.h"
 #include "server/store/archive.h"
+#include "server/store/row_time.h"
 
 namespace pointwright::server {
 
@@ -19,14 +20,6 @@ namespace {
 
 /// What `expires` is where a link has no end.
 constexpr std::int64_t kNever = -1;
-
-std::int64_t to_ms(protocol::TimePoint time) {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(time.time_since_epoch()).count();
-}
-
-std::int64_t now_ms() {
-  return to_ms(std::chrono::system_clock::now());
-}
 
 /// Nothing where no clock of this program shows that time.
 std::optional<protocol::TimePoint> time_of(std::int64_t ms) {

@@ -4,18 +4,12 @@
 
 #include "protocol/json/requests.h"
 #include "server/ingest/files.h"
+#include "server/store/row_time.h"
 
 namespace pointwright::server {
 namespace {
 
 constexpr std::uint64_t kMostRecordBytes = 64 * 1024;
-
-std::chrono::system_clock::time_point from_ms(std::int64_t ms) {
-  return std::chrono::system_clock::time_point(std::chrono::milliseconds(ms));
-}
-std::int64_t to_ms(std::chrono::system_clock::time_point time) {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(time.time_since_epoch()).count();
-}
 
 std::string path_of(const std::string& folder, const std::string& id, const char* ending) {
   std::string path = folder;

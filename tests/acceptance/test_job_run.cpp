@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -15,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "engine/io/cloud_io.h"
+#include "tests/acceptance/bodies.h"
 #include "tests/acceptance/daemon.h"
 
 using namespace pointwright;
@@ -38,20 +37,7 @@ std::string bytes_of(const std::string& path) {
 }
 
 void put_sheet(const std::string& path, std::size_t side) {
-  Cloud cloud;
-  cloud.position.resize(side * side);
-  cloud.id.resize(side * side);
-  for (std::size_t i = 0; i < side * side; ++i) {
-    const float x = static_cast<float>(i % side) / static_cast<float>(side - 1);
-    const float y = static_cast<float>(i / side) / static_cast<float>(side - 1);
-    cloud.position.set(i, {x, y, 0.02F * std::sin(40.0F * x) * std::cos(30.0F * y)});
-    cloud.id[i] = static_cast<std::uint32_t>(i);
-  }
-  const auto bytes = write_cloud(cloud, CloudFormat::kPly, {});
-  REQUIRE(bytes.ok());
-  std::ofstream(path, std::ios::binary)
-      .write(reinterpret_cast<const char*>(bytes.value().data()),
-             static_cast<std::streamsize>(bytes.value().size()));
+  std::ofstream(path, std::ios::binary) << file_of(wavy_sheet(side));
 }
 
 /// Starts the command with its output thrown away.

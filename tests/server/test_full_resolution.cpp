@@ -13,6 +13,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/io/cloud_io.h"
+#include "protocol/json/jobs.h"
 #include "protocol/json/parse.h"
 #include "server/base/descriptor.h"
 #include "server/ingest/files.h"
@@ -522,7 +523,8 @@ TEST_CASE("jobs refuse what they cannot do, and leave nothing behind") {
   params = job.params();
   params.request.recipe.edits[1].edit.level = 9;
   CHECK(job.refused(params).detail.find("edit 2") != std::string::npos);
-  for (const std::uint32_t steps : {0U, 1U, kMaxJobSteps + 1}) {
+  constexpr std::uint32_t kTooMany = protocol::kMostSteps + 1;
+  for (const std::uint32_t steps : {0U, 1U, kTooMany}) {
     params = job.params();
     params.steps = steps;
     CHECK(job.refused(params).detail == "steps must lie between 2 and 1000");
