@@ -108,7 +108,10 @@ export function createJobList(client: ApiClient, options: JobListOptions): JobLi
   };
   return {
     element,
-    take: (job) => feed.take(job),
+    take: (job) => {
+      feed.take(job);
+      setText(news, `${jobName(job)} was started`);
+    },
     start: () => feed.start(),
     stop: () => {
       feed.stop();
