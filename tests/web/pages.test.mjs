@@ -3,12 +3,12 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { waitForIdle } from "../../web/scripts/browser.mjs";
 import {
-  axePath,
   capsulePly,
   checkTroubles,
   createSession,
   json,
   open,
+  seriousFindings,
   service,
   sessionUrl,
   startAroundTests,
@@ -17,17 +17,6 @@ import {
 } from "./support.mjs";
 
 startAroundTests();
-
-async function seriousFindings(page) {
-  // Through the debugger, as the content security policy lets no script be added.
-  await page.evaluate(await (await import("node:fs/promises")).readFile(axePath, "utf8"));
-  const { violations } = await page.evaluate(() =>
-    globalThis.axe.run(document, { resultTypes: ["violations"] }),
-  );
-  return violations
-    .filter(({ impact }) => impact === "serious" || impact === "critical")
-    .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(" | ")}`);
-}
 
 test("an uploaded file becomes a cloud and opens its session", { timeout }, async () => {
   const { page, troubles } = await open(`${service.url}/`);

@@ -1,6 +1,6 @@
 // What the browser tests share: a synthetic cloud, a daemon of their own with the built viewer, a page that is watched.
 
-import { existsSync } from "node:fs";
+import { existsSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, resolve } from "node:path";
 import { after, before } from "node:test";
@@ -12,7 +12,7 @@ export const root = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
 export const waitMs = 240_000;
 
 const fromWeb = createRequire(resolve(root, "web/package.json"));
-export const axePath = fromWeb.resolve("axe-core/axe.min.js");
+const axePath = fromWeb.resolve("axe-core/axe.min.js");
 
 /** A capsule along x with bumps, as a binary PLY: `count` samples, evenly spread. */
 export function capsulePly(count) {
@@ -40,14 +40,14 @@ export async function json(url, init) {
   return response.json();
 }
 
-async function startService() {
+async function startService(args) {
   const dist = resolve(root, "web/dist");
   if (!existsSync(resolve(dist, "index.html"))) throw new Error("web/dist is not built");
-  return startDaemon(["--web", dist]);
+  return startDaemon(["--web", dist, ...args]);
 }
 
-/** A session of a synthetic capsule, ready. */
-export async function createSession(service, count = 12_000) {
+/** A session of a synthetic capsule, ready; on so many of its samples, or on all. */
+export async function createSession(service, count = 12_000, preview = undefined) {
   const cloud = await json(`${service.url}/v1/clouds?name=capsule.ply`, {
     method: "POST",
     headers: { "Content-Type": "application/x-ply" },
@@ -56,7 +56,11 @@ export async function createSession(service, count = 12_000) {
   const session = await json(`${service.url}/v1/sessions`, {
     method: "POST",
     headers: { "Content-Type": "application/json" },
-    body: JSON.stringify({ cloud: cloud.id, name: "Capsule" }),
+    body: JSON.stringify({
+      cloud: cloud.id,
+      name: "Capsule",
+      ...(preview === undefined ? {} : { preview: { count: preview } }),
+    }),
   });
   const ends = Date.now() + waitMs;
   for (;;) {
@@ -173,18 +177,30 @@ export async function checkTroubles(page, troubles) {
   if (all.length > 0) throw new Error(`the page reported: ${all.join("; ")}`);
 }
 
+/** What an automatic audit finds that matters. */
+export async function seriousFindings(page) {
+  // Through the debugger, as the content security policy lets no script be added.
+  await page.evaluate(readFileSync(axePath, "utf8"));
+  const { violations } = await page.evaluate(() =>
+    globalThis.axe.run(document, { resultTypes: ["violations"] }),
+  );
+  return violations
+    .filter(({ impact }) => impact === "serious" || impact === "critical")
+    .map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(" | ")}`);
+}
+
 /** What a test may take, on slow machines too. */
 export const timeout = 600_000;
 /** The daemon, and what opens a page, while a file's tests run. */
 export let service;
 export let open;
 
-/** Starts a daemon and a browser before this file's tests, and ends them afterwards. */
-export function startAroundTests() {
+/** Starts a daemon, with these arguments, and a browser before this file's tests, and ends them afterwards. */
+export function startAroundTests(args = []) {
   let browser;
   before(
     async () => {
-      service = await startService();
+      service = await startService(args);
       ({ browser, open } = await openBrowser());
     },
     { timeout },
@@ -205,8 +221,8 @@ export async function fill(form, numbers) {
 }
 
 /** A page with a session of its own, seen from the front, at rest. */
-export async function openEditor(samples = 12_000, size = undefined) {
-  const session = await createSession(service, samples);
+export async function openEditor(samples = 12_000, size = undefined, preview = undefined) {
+  const session = await createSession(service, samples, preview);
   const { page, troubles } = await open(sessionUrl(service, session), size);
   await waitForIdle(page, waitMs);
   await page.evaluate((camera) => {

@@ -28,8 +28,7 @@ async function main(): Promise<void> {
     installHook(() => bare, { get: () => NO_CAMERA, set: () => undefined });
     try {
       const { showHome } = await import("./ui/home");
-      await client.info();
-      await showHome(root, client);
+      await showHome(root, client, await client.info());
     } catch (error) {
       if (await asksForToken(root, error)) return;
       const failure = createProgress();

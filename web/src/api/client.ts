@@ -1,3 +1,4 @@
+import { readEvents, wholeCharacters } from "./event-stream";
 import { ApiError, networkProblem, problemFromBody } from "./problem";
 import type {
   CloudDocument,
@@ -7,6 +8,12 @@ import type {
   History,
   ImageDocument,
   ImportDocument,
+  Job,
+  JobEstimate,
+  JobEvent,
+  JobRequest,
+  JobResults,
+  JobStatus,
   NamedRegion,
   NewShare,
   RecordedOperation,
@@ -238,6 +245,60 @@ export class ApiClient {
       headers: { "Content-Type": "image/png" },
       body: image,
     });
+  }
+
+  /** Newest first. */
+  async jobs(filter: { status?: JobStatus; limit?: number } = {}): Promise<Job[]> {
+    const query = new URLSearchParams();
+    if (filter.status !== undefined) query.set("status", filter.status);
+    if (filter.limit !== undefined) query.set("limit", String(filter.limit));
+    const text = query.toString();
+    return (await this.json<{ jobs: Job[] }>(text ? `v1/jobs?${text}` : "v1/jobs")).jobs;
+  }
+
+  job(id: string): Promise<Job> {
+    return this.json(`v1/jobs/${id}`);
+  }
+
+  createJob(job: JobRequest): Promise<Job> {
+    return this.send("POST", "v1/jobs", job);
+  }
+
+  /** What a job would take; refused as the job itself would be. */
+  async validateJob(job: JobRequest): Promise<JobEstimate> {
+    const body = { ...job, validate: true };
+    return (await this.send<{ estimate: JobEstimate }>("POST", "v1/jobs", body)).estimate;
+  }
+
+  /** Dismisses a job, or forgets one that has ended. */
+  deleteJob(id: string): Promise<Job> {
+    return this.json(`v1/jobs/${id}`, { method: "DELETE" });
+  }
+
+  restartJob(id: string): Promise<Job> {
+    return this.json(`v1/jobs/${id}/restart`, { method: "POST" });
+  }
+
+  /** A job's log from a byte on, and the byte to go on from; at most a mebibyte at once. */
+  async jobLog(id: string, offset = 0, signal?: AbortSignal): Promise<{ text: string; next: number }> {
+    const response = await this.request(`v1/jobs/${id}/log?offset=${offset}`, signal ? { signal } : {});
+    const bytes = wholeCharacters(new Uint8Array(await response.arrayBuffer()));
+    return { text: new TextDecoder().decode(bytes), next: offset + bytes.byteLength };
+  }
+
+  jobResults(id: string): Promise<JobResults> {
+    return this.json(`v1/jobs/${id}/results`);
+  }
+
+  jobResultUrl(id: string, name: string): string {
+    return this.url(`v1/jobs/${id}/results/${encodeURIComponent(name)}`);
+  }
+
+  /** A job as it is and at each change, until it has ended; throws AbortError where the signal ends it. */
+  async *jobEvents(id: string, signal?: AbortSignal): AsyncGenerator<Job, void, undefined> {
+    const response = await this.request(`v1/jobs/${id}/events`, signal ? { signal } : {});
+    for await (const { event, data } of readEvents(response))
+      if (event === "job") yield (JSON.parse(data) as JobEvent).job;
   }
 
   stream(id: string, signal: AbortSignal): Promise<Response> {

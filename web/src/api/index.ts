@@ -5,6 +5,7 @@ export type { FrameBlock, FrameHeader } from "../protocol/frames";
 export { decodeFrame, type Frame, FrameError } from "../protocol/frames";
 export type { components, paths } from "../protocol/openapi";
 export { ApiClient, type Fetch } from "./client";
+export { EventParser, readEvents, type ServerEvent } from "./event-stream";
 export { ApiError, describeProblem } from "./problem";
 export { SessionStream, type StreamEvent, type StreamSink, type StreamStatus } from "./stream";
 export * from "./tools";

@@ -56,6 +56,17 @@ export interface ImageShape {
 export type ImageChannel = "luminance" | "red" | "green" | "blue" | "alpha";
 
 export type ImageDocument = Schemas["Image"];
+/** What a job is made of; what the server need not be told has its default. */
+export type JobRequest = Partial<Omit<Schemas["JobRequest"], "recipe" | "validate">> & { recipe?: unknown };
+export type JobEstimate = Schemas["JobEstimate"]["estimate"];
+export type Job = Schemas["Job"];
+export type JobStatus = Schemas["JobStatus"];
+export type JobMode = JobEstimate["mode"];
+export type JobFormat = NonNullable<Schemas["JobOutput"]["format"]>;
+export type JobReport = Schemas["JobReport"];
+export type JobResults = Schemas["JobResults"];
+export type JobEvent = Schemas["JobEvent"];
+
 export type Share = Schemas["ShareMembers"];
 export type NewShare = Schemas["NewShare"];
 

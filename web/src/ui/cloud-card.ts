@@ -2,6 +2,7 @@ import type { CloudDocument, SessionSummary } from "../api/types";
 import { parsePreview, previewText } from "../edits/preview-size";
 import { DEFAULT_SCALES, parseScales, scalesText } from "../edits/scales";
 import { sessionUrl } from "../link";
+import { confirmButton } from "./confirm-button";
 import { h, setText } from "./dom";
 import { textField } from "./fields";
 import { formatAge, formatBytes, formatCount } from "./format";
@@ -126,24 +127,4 @@ function sessionRow(session: SessionSummary, options: CloudCardOptions): HTMLEle
       () => void options.removeSession(session.id),
     ),
   );
-}
-
-/** Deletes at the second press: the first only asks, until the hand or the focus goes elsewhere. */
-function confirmButton(label: string, action: () => void): HTMLElement {
-  const button = h(
-    "button",
-    { type: "button", class: "icon-button small delete", title: label, aria: { label } },
-    icon("trash"),
-  );
-  const arm = (armed: boolean): void => {
-    button.classList.toggle("armed", armed);
-    button.setAttribute("aria-label", armed ? `${label}: press again to confirm` : label);
-  };
-  button.addEventListener("click", () => {
-    if (button.classList.contains("armed")) action();
-    else arm(true);
-  });
-  button.addEventListener("blur", () => arm(false));
-  button.addEventListener("pointerleave", () => arm(false));
-  return button;
 }

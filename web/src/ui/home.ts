@@ -1,17 +1,18 @@
 import type { ApiClient } from "../api/client";
 import { problemOf } from "../api/problem";
-import type { CloudDocument, SessionSummary } from "../api/types";
+import type { CloudDocument, ServiceInfo, SessionSummary } from "../api/types";
 import { defaultPreview } from "../edits/preview-size";
 import { DEFAULT_SCALES } from "../edits/scales";
 import { sessionUrl } from "../link";
 import { createCloudCard } from "./cloud-card";
 import { h, replaceChildren, setText } from "./dom";
 import { icon, logo } from "./icons";
+import { createJobsSection } from "./jobs-section";
 import { problemCard } from "./problem-card";
 import { createUploader } from "./uploader";
 
 /** The first page: what clouds the server holds, and how to bring another one. */
-export async function showHome(root: HTMLElement, client: ApiClient): Promise<void> {
+export async function showHome(root: HTMLElement, client: ApiClient, info: ServiceInfo): Promise<void> {
   const list = h("div", { class: "cloud-list", aria: { busy: "true" } });
   const count = h("span", { class: "section-aside" });
   const messages = h("div", { class: "home-messages", aria: { live: "polite" } });
@@ -79,6 +80,7 @@ export async function showHome(root: HTMLElement, client: ApiClient): Promise<vo
         ),
         uploader.element,
         messages,
+        createJobsSection(client, info),
         h(
           "section",
           { class: "home-clouds", aria: { label: "Clouds on this server" } },

@@ -73,6 +73,21 @@ export function createTopBar(bus: Bus, client: ApiClient, store: SessionStore): 
     },
     "Share…",
   );
+  const full = h(
+    "button",
+    {
+      type: "button",
+      class: "button",
+      onclick: async () => {
+        try {
+          (await import("./jobs-dialog")).showJobsDialog(bus, client, store);
+        } catch (error) {
+          reportError(bus, error, "The jobs cannot be shown");
+        }
+      },
+    },
+    "Full resolution…",
+  );
   const help = button("help", "Shortcuts", "?", () => bus.invoke("shortcuts.show"));
   return h(
     "header",
@@ -88,6 +103,7 @@ export function createTopBar(bus: Bus, client: ApiClient, store: SessionStore): 
     h("span", { class: "spacer" }),
     h("div", { class: "top-group" }, undo, redo),
     h("span", { class: "divider", aria: { hidden: "true" } }),
+    full,
     share,
     link,
     help,
