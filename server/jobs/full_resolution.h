@@ -43,7 +43,8 @@ struct JobParams {
   std::uint64_t most_bytes = 0;  ///< of memory, for the decoder; 0: as much as it wants
   bool drop_non_finite = false;  ///< in the modes memory and direct
   Team* team = nullptr;          ///< who does it together; null: this process alone
-  /// An animation: so many clouds, 2 to protocol::kMostSteps, of the recipe at s = 0 up to request.s in even steps.
+  /// An animation: so many clouds, 2 to protocol::kMostSteps, of the recipe at s = 0 up to request.s in even
+  /// steps.
   std::optional<std::uint32_t> steps = std::nullopt;
 };
 

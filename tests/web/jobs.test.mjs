@@ -127,10 +127,34 @@ test("an edit is estimated, made on every sample of the scan, and downloaded", {
 
   await row.getByRole("button", { name: "Log of The capsule" }).click();
   const log = row.getByRole("region", { name: "Log of The capsule" });
-  await log.getByText(/attempt 1: [\s\S]*successful/).waitFor();
+  await log.getByText(/attempt 1, [\s\S]*successful/).waitFor();
   assert.equal(await log.getAttribute("aria-live"), "off");
+
+  const count = dialog.getByLabel("Animation");
+  await count.fill("1");
+  await dialog.getByText("An animation has 2 to 1,000 clouds.").waitFor();
+  assert.ok(await dialog.getByRole("button", { name: "Start", exact: true }).isDisabled());
+  await count.fill("3");
+  await dialog.getByLabel("Name").fill("In motion");
+  await dialog.getByRole("button", { name: "Start", exact: true }).click();
+  const moving = await rowWith(dialog, "In motion", "Finished");
+  const frames = moving.locator(".job-frames a");
+  await frames.nth(2).waitFor();
+  const names = await frames.evaluateAll((links) => links.map(({ download: name }) => name));
+  assert.deepEqual(names, ["In motion_0001.ply", "In motion_0002.ply", "In motion_0003.ply"]);
+  const [half] = await Promise.all([
+    page.waitForEvent("download"),
+    moving.getByRole("link", { name: /^No\. 2 / }).click(),
+  ]);
+  const middle = positionsOf(readFileSync(await half.path()));
+  for (const [i, [x, y]] of before.entries())
+    if (x > 0.75) assert.ok(Math.abs(middle[i][1] - y - 0.2) < 0.01, "half of the way in the middle");
   assert.deepEqual(await seriousFindings(page), []);
   await close();
+  for (const { jobID } of (await json(`${service.url}/v1/jobs`)).jobs.filter(
+    ({ request }) => request.name === "In motion",
+  ))
+    await json(`${service.url}/v1/jobs/${jobID}`, { method: "DELETE" });
 
   const home = await open(`${service.url}/`);
   const section = home.page.getByRole("region", { name: "Jobs", exact: true });
@@ -160,7 +184,7 @@ test("jobs are followed live, dismissed, started again, and a failure says why",
   await row.locator("progress").waitFor();
   assert.equal(streams.length > 0, true, "events are listened to");
   await row.getByRole("button", { name: "Log of Held" }).click();
-  await row.getByText(/attempt 1:/).waitFor();
+  await row.getByText(/attempt 1,/).waitFor();
   assert.deepEqual(await seriousFindings(page), []);
 
   const dismiss = row.getByRole("button", { name: /^Dismiss Held/ });

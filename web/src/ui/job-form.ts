@@ -19,6 +19,8 @@ const PRIORITIES = [
   ["2", "Low: after others"],
 ] as const;
 const FORMATS: readonly JobFormat[] = ["ply", "las", "draco", "xyz"];
+const MIN_STEPS = 2;
+const MAX_STEPS = 1000;
 
 export interface JobForm {
   element: HTMLElement;
@@ -84,22 +86,48 @@ export function createJobForm(
   name.input.maxLength = 120;
   name.element.querySelector(".unit")?.remove();
 
+  const frames = textField("Animation", "", "clouds");
+  frames.input.inputMode = "numeric";
+  frames.input.placeholder = "one";
+  /** Nothing: one cloud; NaN: no number that the server takes. */
+  const steps = (): number | undefined => {
+    const text = frames.input.value.trim();
+    if (text === "") return undefined;
+    const count = Number(text);
+    return Number.isInteger(count) && count >= MIN_STEPS && count <= MAX_STEPS ? count : Number.NaN;
+  };
+  frames.input.addEventListener("input", () => {
+    frames.input.setAttribute("aria-invalid", String(Number.isNaN(steps())));
+    forgetEstimate();
+    refresh();
+  });
+
   const answer = h("div", { class: "job-answer", aria: { live: "polite" } });
   const forgetEstimate = (): void => replaceChildren(answer);
+  const output = (): NonNullable<JobRequest["output"]> => {
+    const count = steps();
+    return {
+      ...(format.select.value === "" ? {} : { format: format.select.value as JobFormat }),
+      ...(count === undefined ? {} : { steps: count }),
+    };
+  };
   const request = (): JobRequest => ({
     session: session.id,
     ...(scan.select.value === "" ? {} : { cloud: scan.select.value }),
-    ...(format.select.value === "" ? {} : { output: { format: format.select.value as JobFormat } }),
+    ...(Object.keys(output()).length === 0 ? {} : { output: output() }),
     ...(mode === "auto" ? {} : { mode }),
     ...(name.input.value.trim() === "" ? {} : { name: name.input.value.trim() }),
     priority: Number(priority.select.value),
   });
+  let obstacle = "";
   let reason = "";
   let busy = false;
   const note = h("p", { class: "hint obstacle", hidden: true });
   const estimate = h("button", { type: "button", class: "button" }, "Estimate");
   const start = h("button", { type: "submit", class: "button primary" }, "Start");
   const refresh = (): void => {
+    const isWrong = obstacle === "" && Number.isNaN(steps());
+    reason = isWrong ? `An animation has ${MIN_STEPS} to ${formatCount(MAX_STEPS)} clouds.` : obstacle;
     estimate.disabled = busy || reason !== "";
     start.disabled = busy || reason !== "";
     setText(note, reason);
@@ -156,8 +184,9 @@ export function createJobForm(
       scan.element,
       name.element,
       format.element,
-      priority.element,
+      frames.element,
       way.element,
+      priority.element,
     ),
     hint,
     answer,
@@ -166,7 +195,7 @@ export function createJobForm(
   return {
     element,
     setObstacle: (next) => {
-      reason = next;
+      obstacle = next;
       refresh();
     },
   };

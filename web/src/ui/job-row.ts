@@ -90,6 +90,7 @@ export function createJobRow(
     void guarded("The job was not forgotten", () => actions.forget(job));
   });
   const downloads = h("span", { class: "job-downloads" });
+  const frames = h("div", { class: "job-frames", hidden: true });
   const session = job.request.session;
   const buttons = h(
     "div",
@@ -108,12 +109,18 @@ export function createJobRow(
     forget,
   );
 
-  const download = (file: ResultFile): HTMLElement => {
+  /** `isFrame`: one cloud of an animation, whose number then says which. */
+  const download = (file: ResultFile, isFrame: boolean): HTMLElement => {
     const url = client.jobResultUrl(job.jobID, file.name);
     const format = job.request.output?.format;
     const extension = file.name.slice(file.name.lastIndexOf("."));
-    const saved = `${job.request.name || "result"}${extension}`;
-    const words = format ? `Download ${FORMAT_NAMES[format]}` : "Download";
+    const number = isFrame ? (/_\d+$/.exec(file.name.slice(0, -extension.length))?.[0] ?? "") : "";
+    const saved = `${job.request.name || "result"}${number}${extension}`;
+    const words = isFrame
+      ? `No. ${Number(number.slice(1))}`
+      : format
+        ? `Download ${FORMAT_NAMES[format]}`
+        : "Download";
     const size = h("span", { class: "job-size" }, formatBytes(file.bytes));
     const link = h(
       "a",
@@ -147,7 +154,12 @@ export function createJobRow(
     listed = true;
     await guarded("The results cannot be listed", async () => {
       const { results } = await client.jobResults(job.jobID);
-      replaceChildren(downloads, ...results.map(download));
+      const isAnimation = results.length > 1;
+      frames.hidden = !isAnimation;
+      replaceChildren(
+        isAnimation ? frames : downloads,
+        ...results.map((file) => download(file, isAnimation)),
+      );
     });
   };
 
@@ -163,6 +175,7 @@ export function createJobRow(
     buttons,
     standing,
     summary,
+    frames,
     bar,
     log.element,
     messages,
