@@ -142,8 +142,7 @@ Setting launchers_setting() {
   return {.key = "launcher",
           .meaning =
               "NAME=COMMAND that starts the workers of jobs, with {worker} where the worker's words go; may "
-              "be given "
-              "more than once",
+              "be given more than once",
           .is_list = true,
           .set =
               [](Config& c, const std::vector<std::string>& v) {
@@ -242,7 +241,7 @@ std::vector<Setting> all_settings() {
           "file with the server's certificate and those between it and its authority (PEM): the daemon "
           "then speaks TLS alone"),
       text_setting("tls_key", &Config::tls_key,
-                   "file with the certificate's key (PEM, without a passphrase)"),
+                   "file with the certificate's key (PEM, without a passphrase; mode 0600 or 0640)"),
       text_setting("web", &Config::web_root,
                    "folder with the viewer's files; none are served where it is not given"),
       samples_setting(),

@@ -26,8 +26,6 @@ Session::Expected last_revision(const RequestHead& head) {
 }  // namespace
 
 Response get_events(Service& service, const Request& request) {
-  if (auto known = check_query(request.head, {"viewer"}); !known.ok())
-    return problem_response(known.problem(), request);
   auto admitted = admit_viewer(service, request);
   if (!admitted.ok()) return problem_response(admitted.problem(), request);
   StreamBody body = [&service, viewing = std::move(admitted.value())](BodySink& sink) {

@@ -20,8 +20,6 @@ Response put_preview(Service& service, const Request& request) {
 Response post_preview(Service& service, const Request& request) {
   const auto session = session_of(service, request);
   if (!session.ok()) return problem_response(session.problem(), request);
-  if (auto known = check_query(request.head, {"attributes"}); !known.ok())
-    return problem_response(known.problem(), request);
   const auto attributes =
       query_attributes(request.head, protocol::kAllFrameAttributes, protocol::kFrameNormal);
   if (!attributes.ok()) return problem_response(attributes.problem(), request);

@@ -15,8 +15,8 @@
 
 namespace pointwright::server {
 
-/// Every parameter is one of `known`, and given once. Problem: kInvalidValue.
-Outcome<Done> check_query(const RequestHead& head, const std::vector<std::string_view>& known);
+/// Every parameter is one of `known`, which have blanks between them, and given once. Problem: kInvalidValue.
+Outcome<Done> check_query(const RequestHead& head, std::string_view known);
 
 /// The parameter's text, where it was given.
 std::optional<std::string> query_value(const RequestHead& head, std::string_view name);

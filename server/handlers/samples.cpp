@@ -162,9 +162,6 @@ Outcome<std::optional<Play>> query_play(const RequestHead& head) {
 Response get_samples(Service& service, const Request& request) {
   const auto session = session_of(service, request);
   if (!session.ok()) return problem_response(session.problem(), request);
-  if (auto known = check_query(request.head, {"format", "level", "attributes", "encoding", "s", "timing"});
-      !known.ok())
-    return problem_response(known.problem(), request);
   const auto format = negotiated_format(request.head, sample_formats());
   if (!format.ok()) return problem_response(format.problem(), request);
   const auto asked_level = query_number(request.head, "level");

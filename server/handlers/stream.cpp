@@ -61,8 +61,6 @@ class StreamWriter {
 }  // namespace
 
 Response get_stream(Service& service, const Request& request) {
-  if (auto known = check_query(request.head, {"attributes", "viewer"}); !known.ok())
-    return problem_response(known.problem(), request);
   constexpr auto kAllowed =
       static_cast<std::uint16_t>(protocol::kAllFrameAttributes & ~unsigned{protocol::kFrameIds});
   const auto asked = query_attributes(request.head, kAllowed, protocol::kFrameNormal);

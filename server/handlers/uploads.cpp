@@ -158,7 +158,6 @@ Response with_tus_headers(const Service& service, Response response, bool is_off
 }
 
 Outcome<std::shared_ptr<BodyTarget>> open_new_upload(Service& service, const Request& request) {
-  if (auto known = check_query(request.head, {}); !known.ok()) return known.problem();
   const auto length = required_number(request.head, "upload-length");
   if (!length.ok()) return length.problem();
   UploadRecord record{.length = length.value()};
@@ -190,7 +189,6 @@ Outcome<std::shared_ptr<BodyTarget>> open_new_upload(Service& service, const Req
 }
 
 Outcome<std::shared_ptr<BodyTarget>> open_upload(Service& service, const Request& request) {
-  if (auto known = check_query(request.head, {}); !known.ok()) return known.problem();
   if (request.head.media_type() != "application/offset+octet-stream")
     return Problem{.kind = ProblemKind::kUnsupportedMediaType,
                    .detail = "send application/offset+octet-stream"};

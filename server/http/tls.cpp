@@ -244,8 +244,7 @@ std::optional<std::string> read_pem(const std::string& path, bool is_key, PemTex
   // A group of those who may read keys is what Debian has in ssl-cert.
   if (is_key && (info.st_mode & (S_IRWXO | S_IWGRP)) != 0)
     return "others than its owner and group may use the key, or the group may change it; its mode must be "
-           "0600 "
-           "or 0640";
+           "0600 or 0640";
   const auto size = static_cast<std::uint64_t>(info.st_size);
   if (size > kMostPemBytes) return "is larger than " + std::to_string(kMostPemBytes) + " bytes";
   text.bytes.resize(static_cast<std::size_t>(size));

@@ -44,7 +44,8 @@ Error file_error(const char* what, const std::string& path, int number) {
 }
 
 Result<std::vector<std::byte>> read_file(const std::string& path, std::uint64_t max_bytes) {
-  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  // Not waiting: a pipe in the place of a file must not hold who asked.
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
   struct stat info {};
   if (!file.is_open() || fstat(file.get(), &info) != 0) return file_error("cannot open", path, errno);
   if (!S_ISREG(info.st_mode)) return file_error("cannot read", path, S_ISDIR(info.st_mode) ? EISDIR : EINVAL);

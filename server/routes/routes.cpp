@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "server/handlers/handlers.h"
+#include "server/handlers/query.h"
 #include "server/handlers/uploads.h"
 
 namespace pointwright::server {
@@ -14,6 +16,7 @@ using enum Permission;
 using Body = BodyPolicy::Kind;
 /// An Idempotency-Key makes the request have one effect.
 constexpr bool kOnce = true;
+constexpr bool kOften = false;
 
 constexpr std::array kRoutes = {
     Route{kGet, "/", Body::kNone, get_service, kOpen},
@@ -31,19 +34,20 @@ constexpr std::array kRoutes = {
     Route{kPost, "/v1/tokens", Body::kJson, create_token, kAdmin},
     Route{kDelete, "/v1/tokens/{id}", Body::kNone, revoke_token, kAdmin},
     Route{kGet, "/v1/clouds", Body::kNone, list_clouds},
-    Route{kPost, "/v1/clouds", Body::kCloud, upload_cloud, kOwner, kOnce},
+    Route{kPost, "/v1/clouds", Body::kCloud, upload_cloud, kOwner, kOnce, "name nonfinite"},
     Route{kGet, "/v1/clouds/{id}", Body::kNone, get_cloud},
     Route{kDelete, "/v1/clouds/{id}", Body::kNone, delete_cloud},
-    Route{kGet, "/v1/clouds/{id}/data", Body::kNone, get_cloud_data},
+    Route{kGet, "/v1/clouds/{id}/data", Body::kNone, get_cloud_data, kByMethod, kOften,
+          "format attributes encoding"},
     Route{kGet, "/v1/imports", Body::kNone, list_imports},
     Route{kGet, "/v1/imports/{id}", Body::kNone, get_import},
     Route{kDelete, "/v1/imports/{id}", Body::kNone, delete_import},
-    Route{kGet, "/v1/jobs", Body::kNone, list_jobs},
+    Route{kGet, "/v1/jobs", Body::kNone, list_jobs, kByMethod, kOften, "status limit"},
     Route{kPost, "/v1/jobs", Body::kLargeJson, create_job, kOwner, kOnce},
     Route{kGet, "/v1/jobs/{id}", Body::kNone, get_job},
     Route{kDelete, "/v1/jobs/{id}", Body::kNone, delete_job},
     Route{kPost, "/v1/jobs/{id}/restart", Body::kNone, restart_job, kByMethod, kOnce},
-    Route{kGet, "/v1/jobs/{id}/log", Body::kNone, get_job_log},
+    Route{kGet, "/v1/jobs/{id}/log", Body::kNone, get_job_log, kByMethod, kOften, "offset"},
     Route{kGet, "/v1/jobs/{id}/events", Body::kNone, get_job_events},
     Route{kGet, "/v1/jobs/{id}/results", Body::kNone, get_job_results},
     Route{kGet, "/v1/jobs/{id}/results/{file}", Body::kNone, get_job_result},
@@ -72,7 +76,7 @@ constexpr std::array kRoutes = {
     Route{kPost, "/v1/sessions/{id}/regions/{region}/operations", Body::kJson, paint_region, kByMethod,
           kOnce},
     Route{kPut, "/v1/sessions/{id}/preview", Body::kJson, put_preview},
-    Route{kPost, "/v1/sessions/{id}/preview", Body::kJson, post_preview},
+    Route{kPost, "/v1/sessions/{id}/preview", Body::kJson, post_preview, kByMethod, kOften, "attributes"},
     Route{kDelete, "/v1/sessions/{id}/preview", Body::kNone, delete_preview},
     Route{kGet, "/v1/sessions/{id}/edits", Body::kNone, list_edits},
     Route{kPost, "/v1/sessions/{id}/edits", Body::kJson, post_edit, kByMethod, kOnce},
@@ -82,9 +86,10 @@ constexpr std::array kRoutes = {
     Route{kPut, "/v1/sessions/{id}/head", Body::kJson, put_head},
     Route{kGet, "/v1/sessions/{id}/recipe", Body::kNone, get_recipe},
     Route{kPost, "/v1/sessions/{id}/recipe", Body::kLargeJson, post_recipe, kByMethod, kOnce},
-    Route{kGet, "/v1/sessions/{id}/samples", Body::kNone, get_samples},
-    Route{kGet, "/v1/sessions/{id}/stream", Body::kNone, get_stream},
-    Route{kGet, "/v1/sessions/{id}/events", Body::kNone, get_events},
+    Route{kGet, "/v1/sessions/{id}/samples", Body::kNone, get_samples, kByMethod, kOften,
+          "format level attributes encoding s timing"},
+    Route{kGet, "/v1/sessions/{id}/stream", Body::kNone, get_stream, kByMethod, kOften, "attributes viewer"},
+    Route{kGet, "/v1/sessions/{id}/events", Body::kNone, get_events, kByMethod, kOften, "viewer"},
 };
 /// The viewer's files answer for every other path that is in their table.
 constexpr Route kAssetRoute{kGet, "/{asset}", Body::kNone, get_asset, kOpen};
@@ -233,7 +238,13 @@ Resolution endpoint_of(Service& service, const Route& route, std::vector<std::st
                             request_id);
   auto caller = admit_caller(service, route, head, captures);
   if (!caller.ok()) return problem_response(caller.problem(), head.path, request_id);
-  if (is_upload_path(head.path))
+  const bool is_upload = is_upload_path(head.path);
+  if (route.permission != kOpen)
+    if (const auto known = check_query(head, route.query); !known.ok()) {
+      Response refusal = problem_response(known.problem(), head.path, request_id);
+      return is_upload ? with_tus_headers(service, std::move(refusal), true) : refusal;
+    }
+  if (is_upload)
     if (const auto problem = check_tus(head))
       return with_tus_headers(service, problem_response(*problem, head.path, request_id), true);
   Endpoint endpoint{

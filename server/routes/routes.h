@@ -28,6 +28,8 @@ struct Route {
   Handler handler;
   Permission permission = Permission::kByMethod;
   bool once = false;  ///< an Idempotency-Key makes it have one effect
+  /// The query parameters that it knows, with blanks between them; others are refused, but by what is open.
+  std::string_view query = {};
 };
 
 std::span<const Route> all_routes();

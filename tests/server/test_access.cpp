@@ -1,21 +1,39 @@
 // Buckets, accounts, links, counters, and what the description of the API says of each row.
 
 #include <doctest/doctest.h>
+#include <sys/stat.h>
 
 #include <cctype>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "server/access/access.h"
 #include "server/access/secret.h"
+#include "server/access/token_store.h"
 #include "server/base/random_id.h"
 #include "server/handlers/openapi.h"
 #include "server/metrics/metrics.h"
 #include "server/routes/routes.h"
+#include "tests/server/temporary_folder.h"
 
 using namespace pointwright;
 using namespace pointwright::server;
 using namespace std::chrono_literals;
+
+TEST_CASE("a pipe that takes the place of the tokens is refused at once, and the tokens stay") {
+  const pointwright::test::TemporaryFolder folder;
+  const std::string path = folder / "tokens.json";
+  REQUIRE(edit_token_file(path, true, [](std::vector<TokenEntry>&) { return Outcome<Done>(Done{}); }).ok());
+  TokenStore tokens(path);
+  REQUIRE(tokens.add({.name = "one"}, 10).ok());
+  std::filesystem::remove(path);
+  REQUIRE(::mkfifo(path.c_str(), 0600) == 0);
+  CHECK(tokens.reload().has_value());
+  CHECK(tokens.list().size() == 1);
+}
 
 TEST_CASE("a bucket gives its capacity at once and then what flows in") {
   Buckets buckets(8);

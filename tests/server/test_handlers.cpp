@@ -3,8 +3,11 @@
 #include <doctest/doctest.h>
 
 #include <cstring>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
+#include <string>
 #include <thread>
 
 #include "engine/io/cloud_io.h"
@@ -46,6 +49,49 @@ TEST_CASE("every route is in the API's description, and everything described has
     routed.insert(method + " " + std::string(route.pattern));
   }
   CHECK(routed == described);
+}
+
+TEST_CASE("every row knows the query parameters that the API's description has, and no others") {
+  const json openapi = json::parse(openapi_json());
+  const auto resolved = [&](const json& value) -> const json& {
+    if (!value.contains("$ref")) return value;
+    return openapi.at(json::json_pointer(value["$ref"].get<std::string>().substr(1)));
+  };
+  std::map<std::string, std::set<std::string>> described;
+  for (const auto& [path, operations] : openapi["paths"].items())
+    for (const auto& [method, operation] : operations.items()) {
+      if (method == "parameters" || !operation.contains("operationId")) continue;
+      auto& names = described[method + " " + path];
+      for (const json& list :
+           {operations.value("parameters", json::array()), operation.value("parameters", json::array())})
+        for (const json& entry : list)
+          if (const json& parameter = resolved(entry); parameter["in"] == "query")
+            names.insert(parameter["name"].get<std::string>());
+    }
+  std::multiset<std::string> wanted;
+  std::multiset<std::string> known;
+  for (const auto& [row, names] : described)
+    for (const std::string& name : names) wanted.insert(row.substr(0, row.find(' ')) + " " + name);
+  for (const Route& route : all_routes()) {
+    std::istringstream names{std::string(route.query)};
+    for (std::string name; names >> name;)
+      known.insert((route.method == Method::kGet ? "get " : "post ") + name);
+  }
+  CHECK(wanted.size() > 15);
+  CHECK(known == wanted);
+}
+
+TEST_CASE("a query parameter that a row does not know is refused before anything is done") {
+  TestService test;
+  const std::string id = test.upload(5);
+  const Answer refused = test.ask(Method::kDelete, "/v1/clouds/" + id + "?force=1");
+  CHECK(refused.status == 422);
+  CHECK(refused.body["errors"][0]["pointer"] == "?force");
+  CHECK(test.get("/v1/clouds/" + id).status == 200);
+  CHECK(test.get("/v1/clouds?limit=1").status == 422);
+  CHECK(test.get("/v1/jobs?limit=1&limit=2").status == 422);
+  CHECK(test.get("/v1/jobs?limit=1").status == 200);
+  CHECK(test.get("/healthz?verbose").status == 200);
 }
 
 TEST_CASE("paths are matched segment by segment, with well-formed ids only") {
