@@ -172,7 +172,7 @@ Outcome<JobDocument> JobQueue::submit(NewJob job, const Seal<JobDocument>& seal)
 
 JobQueue::SharedEntry JobQueue::make_room_locked() {
   if (stopping_ || entries_.size() < settings_.limits.max_jobs) return nullptr;
-  const SharedEntry chosen = displaced(
+  SharedEntry chosen = displaced(
       entries_, [](const Entry& entry) { return entry.kept.owner; },
       [](const Entry& entry) { return entry.kept.document.has_ended() && !entry.has_worker; },
       [](const Entry& entry) { return entry.kept.document.finished.value_or(entry.kept.document.updated); });
