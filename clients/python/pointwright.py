@@ -1181,8 +1181,13 @@ class _ResumableUpload:
             os.remove(self._resume_file)
 
 
-def _save(response: requests.Response, target: Union[str, "os.PathLike[str]"]) -> int:
-    """Writes a streamed body into a file, whole or not at all. Answers its bytes."""
+def _save(
+    response: requests.Response, target: Union[str, "os.PathLike[str]"], expected: Optional[int] = None
+) -> int:
+    """Writes a streamed body into a file, whole or not at all. Answers its bytes.
+
+    expected: how many there are, where that is known otherwise than from the answer's head.
+    """
     part = f"{os.fspath(target)}.{uuid.uuid4().hex[:8]}.part"
     announced = response.headers.get("Content-Length")
     written = 0
@@ -1190,8 +1195,10 @@ def _save(response: requests.Response, target: Union[str, "os.PathLike[str]"]) -
         with response, open(part, "wb") as file:
             for chunk in response.iter_content(1 << 20):
                 written += file.write(chunk)
-        if announced is not None and "Content-Encoding" not in response.headers and written != int(announced):
-            raise Unreachable(f"the download ended after {written} of {announced} bytes")
+        if expected is None and announced is not None and "Content-Encoding" not in response.headers:
+            expected = int(announced)
+        if expected is not None and written != expected:
+            raise Unreachable(f"the download ended after {written} of {expected} bytes")
         os.replace(part, target)
     except requests.RequestException as error:
         raise Unreachable(str(error)) from error
@@ -1642,10 +1649,8 @@ class Job:
         """Writes a file that the job made, the first one where no name is given; returns its bytes."""
         for result in self.results()["results"]:
             if name is None or result["name"] == name:
-                count = _save(self.client.request("GET", result["href"], stream=True), target)
-                if count != result["bytes"]:
-                    raise Unreachable(f"the result came in part only: {count} of {result['bytes']} bytes")
-                return count
+                response = self.client.request("GET", result["href"], stream=True)
+                return _save(response, target, result["bytes"])
         raise ValueError(f"the job has made no {name or 'file'}")
 
     def delete(self) -> None:

@@ -32,6 +32,8 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::size_t kLogPiece = std::size_t{1} << 20U;
 constexpr std::size_t kFilePiece = std::size_t{1} << 18U;
+/// What the names of a job's results begin with.
+constexpr std::string_view kResultStem = "result";
 constexpr std::chrono::milliseconds kPollInterval{200};
 
 Problem invalid(const char* pointer, const std::string& detail) {
@@ -185,7 +187,7 @@ Outcome<JobQueue::NewJob> gather(Service& service, const Request& request, proto
   const std::uint64_t scan_bytes =
       scan->upload != nullptr ? scan->upload->record().length : scan->cloud->document.bytes;
   job.job.bytes = scan_bytes * (1 + std::max<std::uint64_t>(terms.steps, 1));
-  job.job.result = std::string("result").append(file_type(*terms.format).extension);
+  job.job.result = std::string(kResultStem).append(file_type(*terms.format).extension);
   job.fill = [&service, part, preview, scan,
               recipe = std::move(recipe)](const std::string& folder) -> Outcome<Done> {
     if (auto done = write_text(folder + "/" + JobQueue::kRecipeName, recipe); !done.ok()) return done;
@@ -219,10 +221,12 @@ Response file_response(const Request& request, const std::string& path, const pr
       at += count;
     }
   };
-  const std::string extension = result.name.substr(result.name.rfind('.'));
+  // What follows the stem: of an animation's clouds the number, too.
+  const std::string rest = result.name.substr(kResultStem.size());
   return response.with_header("ETag", etag_of({result.sha256}))
       .with_header("Cache-Control", "no-cache")
-      .with_header("Content-Disposition", download_name(name.empty() ? "result" : name, extension));
+      .with_header("Content-Disposition",
+                   download_name(name.empty() ? std::string(kResultStem) : name, rest));
 }
 
 Response no_such_job(const Request& request) {

@@ -173,6 +173,10 @@ TEST_CASE("a session's edits are made on the whole of its cloud, with the report
   CHECK(daemon.get("/v1/jobs?status=failed").json()["jobs"].empty());
   CHECK(daemon.get("/v1/jobs?status=done").status == 422);
   CHECK(daemon.ask("POST", path_of(job) + "/restart").status == 409);
+  // What the disk has lost is told, not sent as nothing.
+  std::filesystem::remove((folder / "data/jobs/") + job["jobID"].get<std::string>() + "/result.ply");
+  CHECK(daemon.get(result["href"]).status == 500);
+
   CHECK(daemon.ask("DELETE", path_of(job)).status == 200);
   CHECK(daemon.get(path_of(job)).status == 404);
   CHECK(std::filesystem::is_empty(folder / "data/jobs"));
@@ -210,7 +214,9 @@ TEST_CASE("an animation is one job with many results") {
   const json results = daemon.get(path_of(job) + "/results").json()["results"];
   REQUIRE(results.size() == 3);
   CHECK(results[2]["name"] == "result_0003.ply");
-  CHECK(daemon.get(results[0]["href"]).body == lifted.file);  // s = 0
+  const Reply first = daemon.get(results[0]["href"]);
+  CHECK(first.body == lifted.file);  // s = 0
+  CHECK(first.headers.at("content-disposition") == "attachment; filename=\"result_0001.ply\"");
   const json plain = done(daemon, submit(daemon, {{"session", lifted.session}}));
   CHECK(daemon.get(results[2]["href"]).body == daemon.get(path_of(plain) + "/results/result.ply").body);
 }

@@ -156,6 +156,11 @@ class Jobs(CommandLine):
                 return document({"jobID": "j1", "status": "accepted"}, 202, {"Location": "/v1/jobs/j1"})
             if path.startswith("/v1/jobs/j1/log"):
                 return 200, {}, b"tile 1 of 2\n"[int(path.split("offset=")[1]) :]
+            if path == "/v1/jobs/j1/results":
+                result = {"name": "result.ply", "href": "/v1/jobs/j1/results/result.ply", "bytes": 10}
+                return document({"results": [result]})
+            if path == "/v1/jobs/j1/results/result.ply":
+                return 200, {}, b"part"
             if method == "DELETE":
                 return document({"jobID": "j1", "status": "dismissed"})
             status, progress = states.pop(0) if len(states) > 1 else states[0]
@@ -174,6 +179,12 @@ class Jobs(CommandLine):
         self.assertIn(b"successful", waited.stdout)
         self.assertEqual(self.ask(fake, "job", "log", "j1", "--offset", "5").stdout, b"1 of 2\n")
         self.assertIn(b"j1", self.ask(fake, "job", "list").stdout)
+        target = self.scan(b"mine")
+        for name in (str(target), "-"):
+            partly = self.ask(fake, "job", "download", "j1", "-o", name)
+            self.assertEqual(partly.returncode, 3, partly.stderr)
+            self.assertIn(b"after 4 of 10 bytes", partly.stderr)
+        self.assertEqual(target.read_bytes(), b"mine", "a part takes no file's place")
         states[:] = [("running", 40)]
         self.assertEqual(self.ask(fake, "job", "cancel", "j1").returncode, 0)
         states[:] = [("successful", 100)]

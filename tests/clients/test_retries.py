@@ -208,7 +208,10 @@ class Jobs(Served):
             if path.startswith("/v1/jobs/j1/log"):
                 return 200, {}, b"tile 1 of 2\ntile 2 of 2\n"[int(path.split("offset=")[1]) :]
             if path == "/v1/jobs/j1/results":
-                return document({"results": [], "report": {"mode": "tiles"}})
+                result = {"name": "result.ply", "href": "/v1/jobs/j1/results/result.ply", "bytes": 10}
+                return document({"results": [result], "report": {"mode": "tiles"}})
+            if path == "/v1/jobs/j1/results/result.ply":
+                return 200, {}, b"part"
             if path == "/v1/jobs/j1/restart":
                 return document({"jobID": "j1", "status": "accepted"}, 202)
             if method == "DELETE":
@@ -233,7 +236,16 @@ class Jobs(Served):
         self.assertEqual(job.log(offset), ("", offset))
         self.assertEqual(job.results()["report"]["mode"], "tiles")
         with self.assertRaises(ValueError):
-            job.download(os.devnull)
+            job.download(os.devnull, "absent.ply")
+        with tempfile.TemporaryDirectory() as folder:
+            target = os.path.join(folder, "result.ply")
+            with open(target, "wb") as file:
+                file.write(b"mine")
+            with self.assertRaisesRegex(Unreachable, "after 4 of 10 bytes"):
+                job.download(target)
+            with open(target, "rb") as file:
+                self.assertEqual(file.read(), b"mine", "a part takes no file's place")
+            self.assertEqual(os.listdir(folder), ["result.ply"])
         self.assertEqual([entry.id for entry in client.jobs()], ["j1"])
         self.assertEqual(job.restart().status, "accepted")
         self.assertEqual(job.cancel().status, "dismissed")

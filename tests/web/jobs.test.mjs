@@ -146,15 +146,15 @@ test("an edit is estimated, made on every sample of the scan, and downloaded", {
     page.waitForEvent("download"),
     moving.getByRole("link", { name: /^No\. 2 / }).click(),
   ]);
+  assert.equal(half.suggestedFilename(), "In-motion_0002.ply");
   const middle = positionsOf(readFileSync(await half.path()));
   for (const [i, [x, y]] of before.entries())
     if (x > 0.75) assert.ok(Math.abs(middle[i][1] - y - 0.2) < 0.01, "half of the way in the middle");
   assert.deepEqual(await seriousFindings(page), []);
   await close();
-  for (const { jobID } of (await json(`${service.url}/v1/jobs`)).jobs.filter(
-    ({ request }) => request.name === "In motion",
-  ))
-    await json(`${service.url}/v1/jobs/${jobID}`, { method: "DELETE" });
+  const [newest] = (await json(`${service.url}/v1/jobs`)).jobs;
+  assert.equal(newest.request.name, "In motion");
+  await json(`${service.url}/v1/jobs/${newest.jobID}`, { method: "DELETE" });
 
   const home = await open(`${service.url}/`);
   const section = home.page.getByRole("region", { name: "Jobs", exact: true });

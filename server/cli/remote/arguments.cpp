@@ -71,8 +71,17 @@ std::string format_of_target(const std::string& target) {
 }
 
 std::uint64_t download(const RemoteService& service, HttpRequest request, const std::string& target,
-                       std::ostream& out) {
+                       std::ostream& out, std::optional<std::uint64_t> expected) {
   std::uint64_t written = 0;
+  const auto check_whole = [&] {
+    if (!expected || written == *expected) return;
+    throw CommandFailure{.code = ExitCode::kUnreachable,
+                         .text = std::string("the download ended after ")
+                                     .append(std::to_string(written))
+                                     .append(" of ")
+                                     .append(std::to_string(*expected))
+                                     .append(" bytes")};
+  };
   if (target == "-") {
     request.write_body = [&](const char* bytes, std::size_t count) {
       out.write(bytes, static_cast<std::streamsize>(count));
@@ -81,6 +90,7 @@ std::uint64_t download(const RemoteService& service, HttpRequest request, const 
     };
     (void)service.ask(std::move(request));
     out.flush();
+    check_whole();
     return written;
   }
   const std::string part = std::string(target).append(".").append(random_id()).append(".part");
@@ -96,6 +106,7 @@ std::uint64_t download(const RemoteService& service, HttpRequest request, const 
     (void)service.ask(std::move(request));
     file.close();
     if (!file.good()) throw wrong(target, "cannot be written; is the disk full?");
+    check_whole();
     std::filesystem::rename(part, target, error);
     if (error) throw wrong(target, "cannot be written");
   } catch (...) {

@@ -21,8 +21,9 @@ nlohmann::json document_argument(const std::string& option, const std::string& t
 std::string if_match(const std::optional<std::uint64_t>& revision);
 
 /// Writes the body of a GET into a file, whole or not at all; "-" is the standard output. Answers the bytes.
+/// `expected`: how many there are, where that is known. Throws CommandFailure, also where fewer or more came.
 std::uint64_t download(const RemoteService& service, HttpRequest request, const std::string& target,
-                       std::ostream& out);
+                       std::ostream& out, std::optional<std::uint64_t> expected = std::nullopt);
 /// The format that a file's name asks for; empty where it asks for none.
 std::string format_of_target(const std::string& target);
 

@@ -104,17 +104,18 @@ export function createJobForm(
 
   const answer = h("div", { class: "job-answer", aria: { live: "polite" } });
   const forgetEstimate = (): void => replaceChildren(answer);
-  const output = (): NonNullable<JobRequest["output"]> => {
+  const output = (): Pick<JobRequest, "output"> => {
     const count = steps();
+    const as = format.select.value;
+    if (as === "" && count === undefined) return {};
     return {
-      ...(format.select.value === "" ? {} : { format: format.select.value as JobFormat }),
-      ...(count === undefined ? {} : { steps: count }),
+      output: { ...(as !== "" && { format: as as JobFormat }), ...(count !== undefined && { steps: count }) },
     };
   };
   const request = (): JobRequest => ({
     session: session.id,
     ...(scan.select.value === "" ? {} : { cloud: scan.select.value }),
-    ...(Object.keys(output()).length === 0 ? {} : { output: output() }),
+    ...output(),
     ...(mode === "auto" ? {} : { mode }),
     ...(name.input.value.trim() === "" ? {} : { name: name.input.value.trim() }),
     priority: Number(priority.select.value),

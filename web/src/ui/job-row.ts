@@ -109,18 +109,14 @@ export function createJobRow(
     forget,
   );
 
-  /** `isFrame`: one cloud of an animation, whose number then says which. */
-  const download = (file: ResultFile, isFrame: boolean): HTMLElement => {
+  const download = (file: ResultFile): HTMLElement => {
     const url = client.jobResultUrl(job.jobID, file.name);
     const format = job.request.output?.format;
-    const extension = file.name.slice(file.name.lastIndexOf("."));
-    const number = isFrame ? (/_\d+$/.exec(file.name.slice(0, -extension.length))?.[0] ?? "") : "";
+    // The clouds of an animation are numbered.
+    const [, number = "", extension = ""] = /(_\d+)?(\.[^.]+)$/.exec(file.name) ?? [];
     const saved = `${job.request.name || "result"}${number}${extension}`;
-    const words = isFrame
-      ? `No. ${Number(number.slice(1))}`
-      : format
-        ? `Download ${FORMAT_NAMES[format]}`
-        : "Download";
+    const plain = format ? `Download ${FORMAT_NAMES[format]}` : "Download";
+    const words = number === "" ? plain : `No. ${Number(number.slice(1))}`;
     const size = h("span", { class: "job-size" }, formatBytes(file.bytes));
     const link = h(
       "a",
@@ -156,10 +152,7 @@ export function createJobRow(
       const { results } = await client.jobResults(job.jobID);
       const isAnimation = results.length > 1;
       frames.hidden = !isAnimation;
-      replaceChildren(
-        isAnimation ? frames : downloads,
-        ...results.map((file) => download(file, isAnimation)),
-      );
+      replaceChildren(isAnimation ? frames : downloads, ...results.map(download));
     });
   };
 
