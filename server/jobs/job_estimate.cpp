@@ -14,9 +14,12 @@
 namespace pointwright::server {
 namespace {
 
-/// Of the modes memory and direct, beside the cloud's own columns: neighbours, levels, bases, results.
+/// Of the modes memory and direct, beside the cloud's own columns: neighbours, levels, bases, results. With
+/// the columns' 20 bytes that is 10 % more than peak_memory_bytes of `pointwright job run --json` with two
+/// edits on 2.6 million samples in either mode; a process with few samples takes tens of mebibytes besides.
 constexpr std::uint64_t kWorkingBytes = 400;
-/// Without a preview nothing can be timed: what two cores of 2023 do with two edits in two bands.
+/// Without a preview nothing can be timed: the same job took 2.2e-6 in tiles, 2.5e-6 in memory and 3.5e-6 in
+/// the mode direct on two cores, reading and writing included.
 constexpr double kUsualSecondsPerSample = 2e-6;
 /// Reading, cutting and writing come on top of the edits.
 constexpr double kSecondsPerByte = 4e-9;
