@@ -142,6 +142,10 @@ class RevisionRequired(Problem):
     """428"""
 
 
+class QuotaReached(Problem):
+    """429 that waiting does not lift: something must be deleted first"""
+
+
 class Overloaded(Problem):
     """429 and 503, after all repetitions"""
 
@@ -181,7 +185,11 @@ def _problem_of(response: requests.Response) -> Problem:
         document = {"title": response.reason or f"the server answered {response.status_code}"}
     document.setdefault("status", response.status_code)
     kind = _BY_STATUS.get(response.status_code, ServerError if response.status_code >= 500 else Problem)
-    return kind(document, _retry_after(response))
+    problem = kind(document, _retry_after(response))
+    # Where time lifts it, the server says when to come again; proxies need not.
+    if response.status_code == 429 and problem.slug == "too-many" and problem.retry_after is None:
+        return QuotaReached(document)
+    return problem
 
 
 def _retry_after(response: requests.Response) -> Optional[float]:

@@ -81,10 +81,10 @@ class Gate {
   }
 
   Result<void> read_header() {
-    constexpr std::string_view kMagic = "DRACO";
+    constexpr std::string_view kDracoMagic = "DRACO";
     std::array<std::uint64_t, 4> head{};  // major, minor, kind, method
     std::uint64_t flags = 0;
-    for (const char c : kMagic) {
+    for (const char c : kDracoMagic) {
       std::uint64_t byte = 0;
       if (!read_byte(byte) || byte != static_cast<unsigned char>(c))
         return malformed("it does not start with 'DRACO'");

@@ -36,6 +36,11 @@ struct LasHeader {
   std::vector<LasExtraDimension> extra;  ///< of the bytes past the point format's own, as far as described
 };
 
+/// Bytes of the header of LAS 1.4.
+inline constexpr std::size_t kLasHeader14Bytes = 375;
+/// Bytes before the content of a variable length record.
+inline constexpr std::size_t kLasRecordHeadBytes = 54;
+
 /// Bytes of a record of that point format (0 to 10) without extra ones.
 std::uint16_t las_record_bytes(std::uint8_t point_format);
 

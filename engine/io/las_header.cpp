@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "engine/io/las.h"
+#include "engine/io/load.h"
 
 namespace pointwright {
 namespace {
@@ -14,8 +14,6 @@ static_assert(std::endian::native == std::endian::little, "LAS is little-endian,
 
 constexpr std::size_t kLeastHeader = 227;
 constexpr std::size_t kHeader13 = 235;
-constexpr std::size_t kHeader14 = 375;
-constexpr std::size_t kRecordHead = 54;
 constexpr std::size_t kExtendedHead = 60;
 constexpr std::uint64_t kMostRecords = 65536;
 constexpr std::size_t kMostExtra = 512;
@@ -31,9 +29,7 @@ Error unsupported(std::string message) {
 
 template <typename T>
 T load(std::span<const std::byte> bytes, std::size_t at) {
-  T value;
-  std::memcpy(&value, bytes.data() + at, sizeof(T));
-  return value;
+  return pointwright::load<T>(bytes.data() + at);
 }
 
 std::string text_at(std::span<const std::byte> bytes, std::size_t at, std::size_t length) {
@@ -95,7 +91,7 @@ struct Record {
 // Walks one list of records; those of extra bytes go to `found`.
 Result<void> walk(std::span<const std::byte> bytes, std::uint64_t at, std::uint64_t count, bool is_extended,
                   std::vector<Record>& found) {
-  const std::size_t head = is_extended ? kExtendedHead : kRecordHead;
+  const std::size_t head = is_extended ? kExtendedHead : kLasRecordHeadBytes;
   if (count > kMostRecords) return malformed(100, "more than 65536 records");
   for (std::uint64_t i = 0; i < count; ++i) {
     if (at > bytes.size() || head > bytes.size() - at)
@@ -143,7 +139,7 @@ Result<void> read_extra(std::span<const std::byte> bytes, LasHeader& header, std
   std::vector<Record> records;
   if (auto done = walk(bytes, header_size, load<std::uint32_t>(bytes, 100), false, records); !done)
     return done;
-  if (header.minor_version >= 4 && header_size >= kHeader14) {
+  if (header.minor_version >= 4 && header_size >= kLasHeader14Bytes) {
     const auto at = load<std::uint64_t>(bytes, 235);
     const auto count = load<std::uint32_t>(bytes, 243);
     if (count > 0)
@@ -223,7 +219,7 @@ Result<LasHeader> parse_las_header(std::span<const std::byte> bytes, std::uint64
     return unsupported("LAS " + std::to_string(major) + "." + std::to_string(header.minor_version) +
                        " is not known; 1.0 to 1.4 are");
   const std::size_t header_size = load<std::uint16_t>(bytes, 94);
-  const std::size_t least = header.minor_version >= 4   ? kHeader14
+  const std::size_t least = header.minor_version >= 4   ? kLasHeader14Bytes
                             : header.minor_version == 3 ? kHeader13
                                                         : kLeastHeader;
   if (header_size < least || header_size > bytes.size()) return malformed(94, "the header's size is wrong");

@@ -2,20 +2,13 @@
 #include <array>
 #include <bit>
 #include <cstddef>
-#include <cstring>
 #include <set>
 
 #include "engine/io/las.h"
+#include "engine/io/load.h"
 
 namespace pointwright {
 namespace {
-
-template <typename T>
-T load(const std::byte* from) {
-  T value;
-  std::memcpy(&value, from, sizeof(T));
-  return value;
-}
 
 class PointReader {
  public:

@@ -12,10 +12,8 @@ namespace {
 
 constexpr double kLargestInteger = 2147483647.0;
 constexpr std::size_t kHeader12 = 227;
-constexpr std::size_t kHeader14 = 375;
-constexpr std::size_t kRecordHead = 54;
 constexpr std::size_t kLongestName = 32;
-constexpr std::size_t kMostExtra = 65535 / kLasExtraDescriptorBytes;
+constexpr std::size_t kMostDescriptors = 65535 / kLasExtraDescriptorBytes;
 
 struct AxisRange {
   double min = std::numeric_limits<double>::max();
@@ -189,16 +187,16 @@ class LasWriter {
   }
 
   Result<std::vector<std::byte>> write() {
-    if (extra_.size() > kMostExtra)
+    if (extra_.size() > kMostDescriptors)
       return Error{.code = ErrorCode::kUnsupportedFormat,
                    .message = "LAS describes at most 341 further attributes; the cloud has " +
                               std::to_string(extra_.size()),
                    .field = {},
-                   .limit = static_cast<double>(kMostExtra),
+                   .limit = static_cast<double>(kMostDescriptors),
                    .actual = static_cast<double>(extra_.size())};
     const std::size_t extra_record =
-        extra_.empty() ? 0 : kRecordHead + extra_.size() * kLasExtraDescriptorBytes;
-    const std::size_t header = format_ >= 6 ? kHeader14 : kHeader12;
+        extra_.empty() ? 0 : kLasRecordHeadBytes + extra_.size() * kLasExtraDescriptorBytes;
+    const std::size_t header = format_ >= 6 ? kLasHeader14Bytes : kHeader12;
     out_.assign(header + extra_record, std::byte{0});
     if (!extra_.empty()) write_descriptors(out_.data() + header);
     const std::size_t points = out_.size();
@@ -270,7 +268,7 @@ class LasWriter {
     std::memcpy(at + 2, kLasSpecUser, std::strlen(kLasSpecUser));
     store(at + 18, kLasExtraRecord);
     store(at + 20, static_cast<std::uint16_t>(extra_.size() * kLasExtraDescriptorBytes));
-    at += kRecordHead;
+    at += kLasRecordHeadBytes;
     for (const ExtraColumn& extra : extra_) {
       store(at + 2, extra_type(extra.type));
       std::memcpy(at + 4, extra.name.data(), extra.name.size());

@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
 #include <limits>
 #include <optional>
 
 #include "engine/io/columns.h"
+#include "engine/io/load.h"
 #include "engine/io/lzf.h"
 #include "engine/io/pcd.h"
 #include "engine/io/text.h"
@@ -173,13 +173,6 @@ struct Layout {
   const std::byte* first = nullptr;
   std::size_t stride = 0;
 };
-
-template <typename T>
-T load(const std::byte* from) {
-  T value;
-  std::memcpy(&value, from, sizeof(T));
-  return value;
-}
 
 template <typename To, typename From>
 ScalarAttribute::Values loaded(const Layout& at, std::uint64_t count) {

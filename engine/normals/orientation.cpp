@@ -81,12 +81,12 @@ std::vector<std::uint32_t> numbered_components(const std::vector<std::uint32_t>&
 // The extreme samples of every component.
 std::vector<Extremes> extremes_of(const Points& points, const std::vector<std::uint32_t>& component,
                                   std::size_t component_count) {
-  using Part = std::vector<std::pair<std::uint32_t, Extremes>>;  // in order of first appearance
-  std::vector<Part> parts((points.size() + kPart - 1) / kPart);
+  using Found = std::vector<std::pair<std::uint32_t, Extremes>>;  // in order of first appearance
+  std::vector<Found> parts((points.size() + kPart - 1) / kPart);
   parallel_for(
       points.size(),
       [&](std::size_t begin, std::size_t end) {
-        Part& part = parts[begin / kPart];
+        Found& part = parts[begin / kPart];
         std::unordered_map<std::uint32_t, std::size_t> place;
         std::size_t at = 0;
         for (std::size_t i = begin; i < end; ++i) {
@@ -99,7 +99,7 @@ std::vector<Extremes> extremes_of(const Points& points, const std::vector<std::u
       },
       kPart);
   std::vector<Extremes> result(component_count);
-  for (const Part& part : parts) {
+  for (const Found& part : parts) {
     for (const auto& [c, extremes] : part) result[c].add(extremes);
   }
   return result;

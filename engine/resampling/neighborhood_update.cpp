@@ -9,23 +9,23 @@
 namespace pointwright {
 namespace {
 
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint32_t kNotSplit = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kSamplesOfRange = 512;
 constexpr std::uint32_t kMostNeighbors = 32;  // of a hierarchy's graph
 
 class Update {
  public:
   Update(const NeighborGraph& before, const Inserted& inserted, const Points& position)
-      : before_(before), inserted_(inserted), position_(position), split_of_(before.count, kNone) {
+      : before_(before), inserted_(inserted), position_(position), split_of_(before.count, kNotSplit) {
     const auto& splits = inserted.splits.splits;
     for (std::size_t s = 0; s < splits.size(); ++s)
       split_of_[splits[s].sample] = static_cast<std::uint32_t>(s);
   }
 
   [[nodiscard]] bool touches(std::size_t i) const {
-    if (split_of_[i] != kNone) return true;
+    if (split_of_[i] != kNotSplit) return true;
     for (std::uint32_t j = 0; j < before_.k; ++j)
-      if (split_of_[before_.index(i, j)] != kNone) return true;
+      if (split_of_[before_.index(i, j)] != kNotSplit) return true;
     return false;
   }
 
@@ -45,13 +45,13 @@ class Update {
     };
     const auto consider_family = [&](std::uint32_t sample) {
       consider(sample);
-      if (split_of_[sample] == kNone) return;
+      if (split_of_[sample] == kNotSplit) return;
       const Split& split = inserted_.splits.splits[split_of_[sample]];
       const auto first = static_cast<std::uint32_t>(before_.count) + split.first_child;
       for (std::uint32_t c = first; c < first + split.children(); ++c) consider(c);
     };
     consider_family(old);
-    if (split_of_[old] != kNone && before_.k <= kRingSize) {
+    if (split_of_[old] != kNotSplit && before_.k <= kRingSize) {
       const RestPatch& patch = inserted_.patches.of(old);
       for (std::uint32_t r = 0; r < patch.ring_size; ++r) consider_family(patch.ring[r]);
     } else {

@@ -10,7 +10,7 @@
 namespace pointwright {
 namespace {
 
-constexpr std::size_t kCancelInterval = 4096;  // contractions
+constexpr std::size_t kContractionsPerLook = 4096;  // contractions
 
 class Greedy {
  public:
@@ -32,7 +32,7 @@ class Greedy {
     log_.steps = make_large_array<ContractionLog::Step>(position.size() - goal_.count);
     connect(position, graph);
     for (std::size_t left = position.size(); left > goal_.count; --left) {
-      if (log_.count % kCancelInterval == 0 && is_cancelled()) return false;
+      if (log_.count % kContractionsPerLook == 0 && is_cancelled()) return false;
       if (!drop_outdated()) {
         keep_live();
         const SurvivorGraph survivors = survivor_graph(nodes_, context_);

@@ -15,8 +15,8 @@
 namespace pointwright {
 namespace {
 
-constexpr std::size_t kMaxSamples = (std::size_t{1} << 31U) - 1;  // what kernels can index
-constexpr std::size_t kCandidates = 5;                            // for each sample that is wanted
+constexpr std::size_t kMostIndexed = (std::size_t{1} << 31U) - 1;  // what kernels can index
+constexpr std::size_t kCandidates = 5;                             // for each sample that is wanted
 
 // The leading bits of a Morton code that a sample shares with the one before it: kBits where the codes are
 // equal, one more where the places are.
@@ -151,8 +151,8 @@ Result<std::vector<std::uint32_t>> subsample(const Points& position, const Point
   if (const auto valid = validate(params); !valid) return valid.error();
   const std::size_t n = position.size();
   POINTWRIGHT_CHECK(normal.empty() || normal.size() == n, "normals must be of these points");
-  if (n > kMaxSamples) {
-    return too_large("too many samples to choose from at once", "position", static_cast<double>(kMaxSamples),
+  if (n > kMostIndexed) {
+    return too_large("too many samples to choose from at once", "position", static_cast<double>(kMostIndexed),
                      static_cast<double>(n));
   }
   const std::size_t wanted =

@@ -24,6 +24,9 @@ namespace pointwright {
 /// Cost: O(N k) a step, parallel; bitwise equal for any thread count
 class KernelVariance {
  public:
+  /// The variance no longer grows where a step adds less than this part of what the first one did.
+  static constexpr double kExhausted = 0.01;
+
   /// Pre: normals only for kAlongNormal; graph.k > 0
   KernelVariance(const Points& points, const Points& normals, const NeighborGraph& graph,
                  SmoothingDirection direction);

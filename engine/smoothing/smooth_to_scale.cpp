@@ -12,8 +12,6 @@ namespace pointwright {
 namespace {
 
 constexpr float kLambda = 0.5F;
-// The variance no longer grows where a step adds less than this part of what the first one did.
-constexpr double kExhausted = 0.01;
 
 }  // namespace
 
@@ -43,7 +41,7 @@ Result<ScaledSmoothing> smooth_to_scale(const Points& points, const Points& norm
     KernelVariance::State trial = variance.stepped(static_cast<double>(kLambda));
     double next = variance.median(trial);
     if (result.iterations == 0) first_gain = next;
-    if (next - reached <= kExhausted * first_gain) break;
+    if (next - reached <= KernelVariance::kExhausted * first_gain) break;
     float lambda = kLambda;
     if (next > goal) {  // the last step: variance grows in proportion to lambda
       lambda = kLambda * static_cast<float>((goal - reached) / (next - reached));

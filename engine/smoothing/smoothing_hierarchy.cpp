@@ -29,8 +29,6 @@ constexpr std::uint32_t kFinestSteps = 4;
 constexpr std::uint32_t kCoarseSteps = 24;
 constexpr std::uint32_t kSmallSteps = 400;
 constexpr std::size_t kSmall = 20'000;
-// A step adds nothing any more: this part of the first one's variance.
-constexpr double kExhausted = 0.01;
 // Sum of the absolute weights of Psi^-1: beyond it a fit amplifies what is wrong with its samples.
 constexpr double kGreatestWeights = 3.0;
 constexpr std::size_t kMostEntries = 1 + kNeighbors;
@@ -65,7 +63,7 @@ LevelMeasure measured(const Points& points, const NeighborGraph& graph, std::uin
     KernelVariance::State state = variance.stepped(kMeasuredLambda);
     const double now = variance.median(state);
     variance.take(std::move(state));
-    if (step > 0 && now - before <= kExhausted * result.variance.front()) {
+    if (step > 0 && now - before <= KernelVariance::kExhausted * result.variance.front()) {
       result.is_exhausted = true;
       break;
     }

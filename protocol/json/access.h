@@ -30,6 +30,8 @@ struct Quotas {
   std::optional<std::uint64_t> streams = std::nullopt;
   std::optional<std::uint64_t> requests_per_second = std::nullopt;
   std::optional<std::uint64_t> jobs = std::nullopt;  ///< that wait or run
+  std::optional<std::uint64_t> clouds = std::nullopt;
+  std::optional<std::uint64_t> images = std::nullopt;
   friend bool operator==(const Quotas&, const Quotas&) = default;
 };
 
@@ -46,6 +48,8 @@ inline constexpr std::array kQuotas = {
     QuotaInfo{"streams", &Quotas::streams},
     QuotaInfo{"requests_per_second", &Quotas::requests_per_second},
     QuotaInfo{"jobs", &Quotas::jobs},
+    QuotaInfo{"clouds", &Quotas::clouds},
+    QuotaInfo{"images", &Quotas::images},
 };
 
 /// POST /v1/tokens

@@ -80,9 +80,11 @@ constexpr std::array kProblems{
                 "Another request writes to this upload, or it is being imported. Retry later.", true},
     ProblemInfo{kRevisionRequired, 428, "revision-required", "If-Match is required",
                 "Edits name the revision that they build on: If-Match: \"r<revision>\".", false},
-    ProblemInfo{kTooMany, 429, "too-many", "A quota is used up",
-                "One more of these would exceed a quota; delete some first. /v1/info lists the limits.",
-                true},
+    ProblemInfo{
+        kTooMany, 429, "too-many", "A quota is used up",
+        "One more of these would exceed a quota. Retry-After says when there is room again; without it, "
+        "delete some first. /v1/info lists the limits.",
+        false},
     ProblemInfo{kHeadTooLarge, 431, "head-too-large", "The request head is too large",
                 "The request line and headers exceed their limits in bytes or number.", false},
     ProblemInfo{

@@ -80,6 +80,9 @@ std::span<const ProblemInfo> all_problems();
 /// Null where no problem has that slug.
 const ProblemInfo* find_problem(std::string_view slug);
 
+/// Retry-After where something of what takes the room ends by itself.
+inline constexpr std::uint32_t kPassingSeconds = 5;
+
 /// The problem that a failure of the engine is to a client. Exhaustive over ErrorCode.
 ProblemKind problem_of(ErrorCode code);
 

@@ -90,7 +90,7 @@ Deformation read_deformation(const Json& value, const std::string& pointer, Json
 
 /// Members that are not there keep their defaults.
 ResamplingParams read_resampling(const Json& value, const std::string& pointer, JsonErrors& errors) {
-  constexpr std::uint64_t kMostSamples = 0xFFFFFFFFU;
+  constexpr std::uint64_t kMostCreated = 0xFFFFFFFFU;
   constexpr std::uint64_t kMostSweeps = 1000;  // the engine's own, tighter limit follows
   ObjectReader object(value, pointer, errors);
   ResamplingParams params;
@@ -102,7 +102,7 @@ ResamplingParams read_resampling(const Json& value, const std::string& pointer, 
   }
   if (const Json* const member = object.optional("max_samples"))
     params.max_samples = static_cast<std::uint32_t>(
-        read_integer(*member, object.pointer_to("max_samples"), errors, 0, kMostSamples).value_or(0));
+        read_integer(*member, object.pointer_to("max_samples"), errors, 0, kMostCreated).value_or(0));
   if (const Json* const member = object.optional("shear_aware"))
     params.shear_aware = read_bool(*member, object.pointer_to("shear_aware"), errors).value_or(false);
   if (const Json* const member = object.optional("sweeps"))
@@ -363,8 +363,8 @@ bool is_valid_region_name(std::string_view name) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
            c == ' ' || c == '.' || c == '-';
   };
-  return !name.empty() && name.size() <= kMaxBytes && std::ranges::all_of(name, allowed) &&
-         std::ranges::find(kReserved, name) == kReserved.end();
+  return !name.empty() && name.size() <= kMaxBytes && name.front() != ' ' && name.back() != ' ' &&
+         std::ranges::all_of(name, allowed) && std::ranges::find(kReserved, name) == kReserved.end();
 }
 
 std::string pointer_of_field(std::string_view field) {

@@ -29,7 +29,8 @@ constexpr std::array<std::uint64_t Limits::*, kQuotaCount> kDefaults = {
     &Limits::token_sessions,     &Limits::token_samples,
     &Limits::token_stored_bytes, &Limits::token_upload_bytes_per_day,
     &Limits::token_streams,      &Limits::token_requests_per_second,
-    &Limits::token_jobs};
+    &Limits::token_jobs,         &Limits::token_clouds,
+    &Limits::token_images};
 
 Problem unauthorized(std::string detail) {
   return Problem{.kind = ProblemKind::kUnauthorized, .detail = std::move(detail)};
@@ -160,22 +161,39 @@ Outcome<Done> Access::charge_upload(const Caller& caller, std::uint64_t bytes) {
   return Done{};
 }
 
-Outcome<QuotaHold> Access::hold(const Caller& caller, Quota quota, std::uint64_t amount) {
+Outcome<QuotaHold> Access::hold(const Caller& caller, std::initializer_list<QuotaPart> parts) {
   if (caller.token.empty()) return QuotaHold();
+  auto holds = std::make_shared<std::vector<QuotaHold>>();
+  for (const QuotaPart& part : parts) {
+    auto held = hold_part(caller, part.quota, part.amount);
+    if (!held.ok()) return held.problem();
+    holds->push_back(std::move(held.value()));
+  }
+  return QuotaHold(std::move(holds));
+}
+
+Outcome<QuotaHold> Access::hold_part(const Caller& caller, Quota quota, std::uint64_t amount) {
   const std::uint64_t limit = limit_of(caller, quota);
   // Guests' streams are their own: they leave those of who shared the session alone.
   const std::string account = quota == Quota::kStreams ? request_key(caller) : caller.token;
   if (auto held = accounts_.hold(account, quota, amount, limit)) return held;
   const std::string name(protocol::kQuotas.at(static_cast<std::size_t>(quota)).name);
-  return Problem{.kind = ProblemKind::kTooMany,
-                 .detail = std::string("one more would exceed the token's quota ").append(name),
-                 .limit = static_cast<double>(limit),
-                 .actual = static_cast<double>(accounts_.held(account, quota) + amount)};
+  Problem problem{.kind = ProblemKind::kTooMany,
+                  .detail = std::string("one more would exceed the token's quota ").append(name),
+                  .limit = static_cast<double>(limit),
+                  .actual = static_cast<double>(accounts_.held(account, quota) + amount)};
+  // Streams and jobs end by themselves; what else is held stays until it is deleted.
+  if (quota == Quota::kStreams || quota == Quota::kJobs) problem.retry_after = protocol::kPassingSeconds;
+  return problem;
 }
 
-QuotaHold Access::hold_again(const std::string& owner, Quota quota, std::uint64_t amount) {
+QuotaHold Access::hold_again(const std::string& owner, std::initializer_list<QuotaPart> parts) {
   if (owner.empty()) return {};
-  return accounts_.hold(owner, quota, amount, std::numeric_limits<std::uint64_t>::max());
+  auto holds = std::make_shared<std::vector<QuotaHold>>();
+  for (const QuotaPart& part : parts)
+    holds->push_back(
+        accounts_.hold(owner, part.quota, part.amount, std::numeric_limits<std::uint64_t>::max()));
+  return holds;
 }
 
 protocol::CallerDocument Access::describe(const Caller& caller) const {

@@ -2,6 +2,7 @@
 // Who asks, and how much of everything they may have.
 
 #include <cstdint>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
@@ -34,17 +35,18 @@ class Access {
   Outcome<Done> charge_request(const Caller& caller);
   /// Bytes that this caller is about to upload. Problem: too many
   Outcome<Done> charge_upload(const Caller& caller, std::uint64_t bytes);
-  /// Holds so much of one of the caller's quotas, but for the two above. Problem: too many
-  Outcome<QuotaHold> hold(const Caller& caller, Quota quota, std::uint64_t amount);
+  /// Holds parts of the caller's quotas, but for the two above: all of them, or none. Problem: too many
+  Outcome<QuotaHold> hold(const Caller& caller, std::initializer_list<QuotaPart> parts);
 
   /// The same for what its owner has already, whatever the quota is now: after a restart.
-  QuotaHold hold_again(const std::string& owner, Quota quota, std::uint64_t amount);
+  QuotaHold hold_again(const std::string& owner, std::initializer_list<QuotaPart> parts);
 
   /// What the quota comes to for the caller.
   [[nodiscard]] std::uint64_t limit_of(const Caller& caller, Quota quota) const;
   [[nodiscard]] protocol::CallerDocument describe(const Caller& caller) const;
 
  private:
+  Outcome<QuotaHold> hold_part(const Caller& caller, Quota quota, std::uint64_t amount);
   [[nodiscard]] Outcome<Caller> caller_of(std::string_view secret) const;
   [[nodiscard]] Buckets::Flow request_flow(const Caller& caller) const;
   [[nodiscard]] Buckets::Flow upload_flow(const Caller& caller) const;

@@ -20,12 +20,19 @@ enum class Quota {
   kUploadBytesPerDay,
   kStreams,
   kRequestsPerSecond,
-  kJobs
+  kJobs,
+  kClouds,
+  kImages
 };
 inline constexpr std::size_t kQuotaCount = protocol::kQuotas.size();
 
-/// A part of a quota, given back with the last copy.
+/// Parts of quotas, given back with the last copy.
 using QuotaHold = std::shared_ptr<const void>;
+
+struct QuotaPart {
+  Quota quota;
+  std::uint64_t amount;
+};
 
 /// Thread-safe; holds may outlive it.
 class Accounts {

@@ -15,7 +15,7 @@
 namespace pointwright::server {
 namespace {
 
-Error wrong(std::string message, std::string field) {
+Error wrong_option(std::string message, std::string field) {
   return Error{.code = ErrorCode::kInvalidArgument, .message = std::move(message), .field = std::move(field)};
 }
 
@@ -24,7 +24,7 @@ Result<VolumePreservation> preservation_of(const std::string& name) {
   if (name == "local") return VolumePreservation::kLocal;
   if (name == "global") return VolumePreservation::kGlobal;
   if (name == "taubin") return VolumePreservation::kTaubin;
-  return wrong("none, local, global or taubin", "preserve");
+  return wrong_option("none, local, global or taubin", "preserve");
 }
 
 Result<Points> smoothed_points(const Cloud& cloud, const RestSurface& rest, const SmoothOptions& options,
@@ -52,7 +52,7 @@ Result<Points> smoothed_points(const Cloud& cloud, const RestSurface& rest, cons
 
 Result<SimplifyTarget> target_of(const Cloud& cloud, const SimplifyOptions& options) {
   if (int{options.count.has_value()} + int{options.ratio.has_value()} + int{options.error.has_value()} != 1)
-    return wrong("one of --count, --ratio and --error", "");
+    return wrong_option("one of --count, --ratio and --error", "");
   if (options.count) return SimplifyTarget(KeepCount{.count = *options.count});
   if (options.ratio) return SimplifyTarget(KeepRatio{.ratio = *options.ratio});
   const auto diagonal = static_cast<double>(bounds_of(cloud.position).diagonal());
@@ -71,8 +71,8 @@ Result<Cloud> contracted(const Cloud& cloud, const SimplifyOptions& options, con
 
 // Normals tell the sheets of thin parts apart where the cloud has them.
 Result<Cloud> chosen_evenly(const Cloud& cloud, const SimplifyOptions& options) {
-  if (options.error) return wrong("an error bound is for --method quadrics", "error");
-  if (options.neighbors) return wrong("neighbourhoods are for --method quadrics", "neighbors");
+  if (options.error) return wrong_option("an error bound is for --method quadrics", "error");
+  if (options.neighbors) return wrong_option("neighbourhoods are for --method quadrics", "neighbors");
   SubsampleParams params;
   if (options.count) params.target = KeepCount{.count = *options.count};
   if (options.ratio) params.target = KeepRatio{.ratio = *options.ratio};
@@ -85,9 +85,9 @@ Result<Cloud> chosen_evenly(const Cloud& cloud, const SimplifyOptions& options) 
 
 Result<Cloud> smoothed(const Cloud& cloud, const SmoothOptions& options, std::string& report) {
   if (options.scale.has_value() == options.iterations.has_value())
-    return wrong("one of --scale and --iterations", "scale");
+    return wrong_option("one of --scale and --iterations", "scale");
   if (options.scale && !(*options.scale > 0.0 && *options.scale <= 0.2))
-    return wrong("a scale lies between 0 and 0.2 of the diagonal", "scale");
+    return wrong_option("a scale lies between 0 and 0.2 of the diagonal", "scale");
   const auto preserve = preservation_of(options.preserve);
   if (!preserve) return preserve.error();
   const auto rest = rest_surface(cloud, options.neighbors, ExecutionContext{});
@@ -101,7 +101,7 @@ Result<Cloud> smoothed(const Cloud& cloud, const SmoothOptions& options, std::st
 
 Result<Cloud> simplified(const Cloud& cloud, const SimplifyOptions& options, std::string& report) {
   if (options.method != "quadrics" && options.method != "uniform")
-    return wrong("quadrics or uniform", "method");
+    return wrong_option("quadrics or uniform", "method");
   const auto target = target_of(cloud, options);
   if (!target) return target.error();
   auto result = options.method == "uniform" ? chosen_evenly(cloud, options)

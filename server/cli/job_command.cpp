@@ -67,9 +67,9 @@ protocol::Parsed<protocol::RecipeRequest> parse_recipe_file(std::string_view tex
 enum class Telling { kNothing, kLine, kEvents };
 
 /// A line that is written over and over, or one event after the other, at most ten times a second.
-class ProgressLine {
+class PhaseTeller {
  public:
-  ProgressLine(std::ostream& err, Telling telling) : err_(err), telling_(telling) {}
+  PhaseTeller(std::ostream& err, Telling telling) : err_(err), telling_(telling) {}
   void show(const std::string& phase, double fraction) {
     const auto now = std::chrono::steady_clock::now();
     if (telling_ == Telling::kNothing || (phase == phase_ && now - last_ < std::chrono::milliseconds(100)))
@@ -301,9 +301,9 @@ int run_job(const JobRunOptions& options, std::ostream& out, std::ostream& err, 
     return 0;
   }
   const bool is_silent = options.quiet || options.json || !leads;
-  ProgressLine line(options.events ? out : err, is_silent        ? Telling::kNothing
-                                                : options.events ? Telling::kEvents
-                                                                 : Telling::kLine);
+  PhaseTeller line(options.events ? out : err, is_silent        ? Telling::kNothing
+                                               : options.events ? Telling::kEvents
+                                                                : Telling::kLine);
   const auto begin = std::chrono::steady_clock::now();
   const auto outcome = with_memory(options.threads, [&] {
     return run_full_resolution(

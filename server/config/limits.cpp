@@ -105,6 +105,8 @@ constexpr std::array kTable = {
               "time after which a job that has ended is deleted with its results, seconds; 0: never"},
     LimitInfo{"token_jobs", &Limits::token_jobs, 0, 100'000, "jobs of one token that wait or run"},
     LimitInfo{"token_imports", &Limits::token_imports, 0, 100'000, "imports of one token under way at once"},
+    LimitInfo{"token_clouds", &Limits::token_clouds, 0, 1'000'000, "clouds of one token held at once"},
+    LimitInfo{"token_images", &Limits::token_images, 0, 1'000'000, "images of one token held at once"},
 };
 
 }  // namespace

@@ -69,6 +69,8 @@ struct Limits {
   std::uint64_t job_retention_s = 7ULL * 86'400ULL;
   std::uint64_t token_jobs = 8;
   std::uint64_t token_imports = 8;
+  std::uint64_t token_clouds = 32;
+  std::uint64_t token_images = 32;
   friend bool operator==(const Limits&, const Limits&) = default;
 };
 

@@ -5,8 +5,7 @@ namespace pointwright::server {
 
 Response get_asset(Service& service, const Request& request) {
   const Asset* asset = service.assets.find(request.head.path);
-  if (asset == nullptr)
-    return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such page"}, request);
+  if (asset == nullptr) return not_found("there is no such page", request);
   // Files below /assets/ carry a hash in their names, so that they never change; pages are asked for anew.
   const bool is_hashed = request.head.path.rfind("/assets/", 0) == 0;
   const std::string caching = is_hashed ? "public, max-age=31536000, immutable" : "no-cache";

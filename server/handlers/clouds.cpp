@@ -14,10 +14,6 @@
 namespace pointwright::server {
 namespace {
 
-Response not_found(const Request& request) {
-  return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such cloud"}, request);
-}
-
 std::string content_tag(const protocol::CloudDocument& cloud) {
   return etag_of({cloud.sha256});
 }
@@ -62,7 +58,8 @@ Outcome<LeasedUpload> lease_upload(Service& service, const Request& request) {
     return problem;
   }
   const UploadRecord& record = lease.value()->record();
-  auto quota = service.access.hold(request.caller, Quota::kStoredBytes, record.length);
+  auto quota =
+      service.access.hold(request.caller, {{Quota::kStoredBytes, record.length}, {Quota::kClouds, 1}});
   if (!quota.ok()) return quota.problem();
   ImportRequest import{
       .name = asked.value().name.value_or(protocol::is_valid_name(record.name) ? record.name : "cloud"),
@@ -91,7 +88,8 @@ Outcome<SharedCloud> import_upload(Service& service, LeasedUpload& upload,
 Outcome<ImportRequest> body_import(Service& service, const Request& request) {
   auto import = import_request(request.head);
   if (!import.ok()) return import.problem();
-  auto quota = service.access.hold(request.caller, Quota::kStoredBytes, request.body.size());
+  auto quota =
+      service.access.hold(request.caller, {{Quota::kStoredBytes, request.body.size()}, {Quota::kClouds, 1}});
   if (!quota.ok()) return quota.problem();
   import.value().owner = request.caller.token;
   import.value().quota = std::move(quota.value());
@@ -194,7 +192,7 @@ Response upload_cloud(Service& service, const Request& request) {
 
 Response get_cloud(Service& service, const Request& request) {
   const SharedCloud cloud = service.clouds.find(request.captures.at(0));
-  if (cloud == nullptr) return not_found(request);
+  if (cloud == nullptr) return not_found("there is no such cloud", request);
   const std::string etag = content_tag(cloud->document);
   if (is_unchanged(request.head, etag)) return not_modified(etag);
   return json_response(protocol::to_json(cloud->document)).with_header("ETag", etag);
@@ -202,7 +200,7 @@ Response get_cloud(Service& service, const Request& request) {
 
 Response get_cloud_data(Service& service, const Request& request) {
   const SharedCloud cloud = service.clouds.find(request.captures.at(0));
-  if (cloud == nullptr) return not_found(request);
+  if (cloud == nullptr) return not_found("there is no such cloud", request);
   const auto format = negotiated_format(request.head, cloud_file_formats());
   if (!format.ok()) return problem_response(format.problem(), request);
   const auto options = query_file_options(request.head, format.value());

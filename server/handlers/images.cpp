@@ -6,10 +6,6 @@ namespace {
 
 constexpr std::string_view kMediaType = "image/png";
 
-Response not_found(const Request& request) {
-  return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such image"}, request);
-}
-
 std::string content_tag(const StoredImage& image) {
   return etag_of({image.sha256});
 }
@@ -24,7 +20,8 @@ Response list_images(Service& service, const Request& request) {
 }
 
 Response upload_image(Service& service, const Request& request) {
-  auto quota = service.access.hold(request.caller, Quota::kStoredBytes, request.body.size());
+  auto quota =
+      service.access.hold(request.caller, {{Quota::kStoredBytes, request.body.size()}, {Quota::kImages, 1}});
   if (!quota.ok()) return problem_response(quota.problem(), request);
   const auto begin = std::chrono::steady_clock::now();
   const auto image = service.images.add(service.decode_image, request.body_bytes(), request.caller.token,
@@ -39,14 +36,14 @@ Response upload_image(Service& service, const Request& request) {
 
 Response get_image(Service& service, const Request& request) {
   const SharedImage image = service.images.find(request.captures.at(0));
-  if (image == nullptr) return not_found(request);
+  if (image == nullptr) return not_found("there is no such image", request);
   if (is_unchanged(request.head, content_tag(*image))) return not_modified(content_tag(*image));
   return json_response(protocol::to_json(image->document)).with_header("ETag", content_tag(*image));
 }
 
 Response get_image_data(Service& service, const Request& request) {
   const SharedImage image = service.images.find(request.captures.at(0));
-  if (image == nullptr) return not_found(request);
+  if (image == nullptr) return not_found("there is no such image", request);
   const std::string etag = etag_of({image->sha256, "data"});
   if (is_unchanged(request.head, etag)) return not_modified(etag);
   const auto content = service.images.content_of(service.decode_image, *image);

@@ -13,14 +13,12 @@ Response list_imports(Service& service, const Request& request) {
 
 Response get_import(Service& service, const Request& request) {
   const auto import = service.imports.find(request.captures.at(0));
-  if (!import)
-    return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such import"}, request);
+  if (!import) return not_found("there is no such import", request);
   return json_response(protocol::to_json(*import));
 }
 
 Response delete_import(Service& service, const Request& request) {
-  if (!service.imports.remove(request.captures.at(0)))
-    return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such import"}, request);
+  if (!service.imports.remove(request.captures.at(0))) return not_found("there is no such import", request);
   return {.status = 204};
 }
 

@@ -230,7 +230,7 @@ Response file_response(const Request& request, const std::string& path, const pr
 }
 
 Response no_such_job(const Request& request) {
-  return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such job"}, request);
+  return not_found("there is no such job", request);
 }
 
 }  // namespace
@@ -253,7 +253,7 @@ Response create_job(Service& service, const Request& request) {
   auto asked = parsed_body(request, protocol::parse_job_request, large_limits(service));
   if (!asked.ok()) return problem_response(asked.problem(), request);
   const bool only_validate = asked.value().validate;
-  auto quota = service.access.hold(request.caller, Quota::kJobs, 1);
+  auto quota = service.access.hold(request.caller, {{Quota::kJobs, 1}});
   if (!quota.ok()) return problem_response(quota.problem(), request);
   auto job = gather(service, request, std::move(asked.value()));
   if (!job.ok()) return problem_response(job.problem(), request);
@@ -262,7 +262,7 @@ Response create_job(Service& service, const Request& request) {
     if (!estimate.ok()) return problem_response(estimate.problem(), request);
     return json_response({{"estimate", std::move(estimate.value())}});
   }
-  auto stored = service.access.hold(request.caller, Quota::kStoredBytes, job.value().job.bytes);
+  auto stored = service.access.hold(request.caller, {{Quota::kStoredBytes, job.value().job.bytes}});
   if (!stored.ok()) return problem_response(stored.problem(), request);
   job.value().job.quota = std::move(quota.value());
   job.value().job.stored = std::move(stored.value());
@@ -287,7 +287,7 @@ Response delete_job(Service& service, const Request& request) {
 }
 
 Response restart_job(Service& service, const Request& request) {
-  auto quota = service.access.hold(request.caller, Quota::kJobs, 1);
+  auto quota = service.access.hold(request.caller, {{Quota::kJobs, 1}});
   if (!quota.ok()) return problem_response(quota.problem(), request);
   const auto job = service.jobs.restart(request.captures.at(0), std::move(quota.value()));
   if (!job.ok()) return problem_response(job.problem(), request);

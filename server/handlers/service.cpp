@@ -77,20 +77,21 @@ std::vector<std::string> Service::recover() {
     std::size_t damaged = 0;
     auto kept_clouds = archive->clouds(damaged);
     for (KeptCloud& cloud : kept_clouds)
-      cloud.quota = access.hold_again(cloud.owner, Quota::kStoredBytes, cloud.document.bytes);
+      cloud.quota =
+          access.hold_again(cloud.owner, {{Quota::kStoredBytes, cloud.document.bytes}, {Quota::kClouds, 1}});
     clouds.restore(std::move(kept_clouds));
     auto kept_images = archive->images(damaged);
     for (KeptImage& image : kept_images)
-      image.quota = access.hold_again(image.owner, Quota::kStoredBytes, image.document.bytes);
+      image.quota =
+          access.hold_again(image.owner, {{Quota::kStoredBytes, image.document.bytes}, {Quota::kImages, 1}});
     images.restore(std::move(kept_images));
     if (damaged > 0)
       notes.push_back(std::to_string(damaged) +
                       " clouds or images are damaged and not served; no file is deleted");
     auto kept = archive->sessions();
     for (KeptSession& session : kept)
-      session.quota = std::make_shared<const std::pair<QuotaHold, QuotaHold>>(
-          access.hold_again(session.owner, Quota::kSessions, 1),
-          access.hold_again(session.owner, Quota::kSamples, session.samples));
+      session.quota =
+          access.hold_again(session.owner, {{Quota::kSessions, 1}, {Quota::kSamples, session.samples}});
     for (const KeptSession& session : kept)
       if (session.damage) notes.push_back("session " + session.id + " is not served: " + *session.damage);
     sessions.restore(std::move(kept));
@@ -100,8 +101,8 @@ std::vector<std::string> Service::recover() {
       notes.push_back(std::to_string(damaged_shares) + " share links are damaged and open nothing");
     if (damaged == 0) archive->sweep();
     const auto hold = [this](KeptJob& job) {
-      if (!job.document.has_ended()) job.quota = access.hold_again(job.owner, Quota::kJobs, 1);
-      job.stored = access.hold_again(job.owner, Quota::kStoredBytes, job.bytes);
+      if (!job.document.has_ended()) job.quota = access.hold_again(job.owner, {{Quota::kJobs, 1}});
+      job.stored = access.hold_again(job.owner, {{Quota::kStoredBytes, job.bytes}});
     };
     for (std::string& note : jobs.recover(hold)) notes.push_back(std::move(note));
   } catch (const DatabaseError& error) {
@@ -128,8 +129,7 @@ Response answer_once(Service& service, const Request& request, Handler handler) 
   const bool is_plain = !key->empty() && key->size() <= kMostBytes &&
                         std::all_of(key->begin(), key->end(), [](char c) { return c > ' ' && c <= '~'; });
   if (!is_plain)
-    return problem_response({.kind = ProblemKind::kMalformedRequest,
-                             .detail = "an Idempotency-Key has 1 to 255 visible ASCII characters"},
+    return problem_response(malformed_request("an Idempotency-Key has 1 to 255 visible ASCII characters"),
                             request);
   std::string asked = std::string(method_name(request.head.method)) + "\n" + request.head.path + "\n";
   for (const auto& [name, value] : request.head.query) asked += name + "=" + value + "\n";
@@ -191,8 +191,7 @@ Outcome<Session::Expected> expected_revision(const RequestHead& head) {
     const auto [stop, error] = std::from_chars(header->data() + 2, end, revision);
     if (error == std::errc{} && stop == end) return Session::Expected(revision);
   }
-  return Problem{.kind = ProblemKind::kMalformedRequest,
-                 .detail = "If-Match must be one strong tag \"r<n>\", or *"};
+  return malformed_request("If-Match must be one strong tag \"r<n>\", or *");
 }
 
 Outcome<Session::Expected> required_revision(const RequestHead& head) {

@@ -11,13 +11,9 @@ Outcome<std::shared_ptr<const void>> hold_session(Service& service, const Caller
   const SharedCloud cloud = service.clouds.find(asked.cloud);
   // create() says so.
   if (cloud == nullptr || !caller.may_see(cloud->owner)) return std::shared_ptr<const void>();
-  auto session = service.access.hold(caller, Quota::kSessions, 1);
-  if (!session.ok()) return session.problem();
   const std::uint64_t whole = cloud->document.report.sample_count;
-  auto samples = service.access.hold(caller, Quota::kSamples, std::min(whole, asked.preview.value_or(whole)));
-  if (!samples.ok()) return samples.problem();
-  return std::shared_ptr<const void>(
-      std::make_shared<const std::pair<QuotaHold, QuotaHold>>(session.value(), samples.value()));
+  const std::uint64_t first = std::min(whole, asked.preview.value_or(whole));
+  return service.access.hold(caller, {{Quota::kSessions, 1}, {Quota::kSamples, first}});
 }
 
 }  // namespace

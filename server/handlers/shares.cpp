@@ -20,7 +20,7 @@ Response create_share(Service& service, const Request& request) {
   if (!service.sessions.owner_of(id)) {
     // Deleted in between, where nothing is kept that would have told.
     service.access.shares.forget(id);
-    return problem_response({.kind = ProblemKind::kNotFound, .detail = "there is no such session"}, request);
+    return not_found("there is no such session", request);
   }
   const auto& [share, capability] = made.value();
   protocol::JsonDocument document = protocol::to_json(share.document);

@@ -18,10 +18,6 @@ constexpr std::string_view kExtensions = "creation,creation-with-upload,checksum
 constexpr std::size_t kMostMetadata = 16 * 1024;
 constexpr std::size_t kLongestName = 255;
 
-Problem malformed(std::string detail) {
-  return {.kind = ProblemKind::kMalformedRequest, .detail = std::move(detail)};
-}
-
 /// A header that must be one whole number.
 Outcome<std::uint64_t> required_number(const RequestHead& head, std::string_view name) {
   const auto text = head.header(name);
@@ -31,7 +27,7 @@ Outcome<std::uint64_t> required_number(const RequestHead& head, std::string_view
     if (!text->empty() && text->size() <= 18 && error == std::errc{} && end == text->data() + text->size())
       return value;
   }
-  return malformed(std::string(name).append(" must be a whole number"));
+  return malformed_request(std::string(name).append(" must be a whole number"));
 }
 
 std::optional<std::string> from_base64(std::string_view text) {
@@ -56,9 +52,9 @@ std::optional<std::string> from_base64(std::string_view text) {
 /// "key base64,key base64": filename and filetype are understood, the others kept.
 Outcome<Done> read_metadata(const RequestHead& head, UploadRecord& record) {
   const std::string_view all = head.header("upload-metadata").value_or("");
-  if (all.size() > kMostMetadata) return malformed("Upload-Metadata is longer than 16384 bytes");
+  if (all.size() > kMostMetadata) return malformed_request("Upload-Metadata is longer than 16384 bytes");
   if (std::ranges::any_of(all, [](char c) { return c < ' ' || c > '~'; }))
-    return malformed("Upload-Metadata has bytes that are not ASCII");
+    return malformed_request("Upload-Metadata has bytes that are not ASCII");
   record.metadata = all;
   std::string_view rest = all;
   while (!rest.empty()) {
@@ -68,7 +64,8 @@ Outcome<Done> read_metadata(const RequestHead& head, UploadRecord& record) {
     const std::string_view key = pair.substr(0, pair.find(' '));
     pair.remove_prefix(std::min(key.size() + 1, pair.size()));
     const auto value = from_base64(pair);
-    if (key.empty() || !value) return malformed("Upload-Metadata is not a list of: key, blank, base64");
+    if (key.empty() || !value)
+      return malformed_request("Upload-Metadata is not a list of: key, blank, base64");
     if (key == "filename") record.name = clean_text(value->substr(0, kLongestName));
     if (key == "filetype") record.media_type = clean_text(value->substr(0, kLongestName));
   }
@@ -84,10 +81,11 @@ Outcome<std::optional<UploadChecksum>> read_checksum(const RequestHead& head) {
   if (name == "sha1") {
     checksum.algorithm = Digest::Algorithm::kSha1;
   } else if (name != "sha256") {
-    return malformed("Upload-Checksum names another algorithm than sha1 and sha256");
+    return malformed_request("Upload-Checksum names another algorithm than sha1 and sha256");
   }
   const std::size_t expected = checksum.algorithm == Digest::Algorithm::kSha1 ? 20 : 32;
-  if (!digest || digest->size() != expected) return malformed("Upload-Checksum is not a digest in base64");
+  if (!digest || digest->size() != expected)
+    return malformed_request("Upload-Checksum is not a digest in base64");
   checksum.digest = *digest;
   return std::optional<UploadChecksum>(checksum);
 }

@@ -28,7 +28,7 @@ Outcome<std::string> viewer_name(const RequestHead& head) {
 }  // namespace
 
 Outcome<StreamSlot> admit_stream(Service& service, const Request& request) {
-  auto quota = service.access.hold(request.caller, Quota::kStreams, 1);
+  auto quota = service.access.hold(request.caller, {{Quota::kStreams, 1}});
   if (!quota.ok()) return quota.problem();
   auto slot = service.streams.hold(1);
   if (slot == nullptr)

@@ -7,10 +7,6 @@
 namespace pointwright::server {
 namespace {
 
-Problem malformed(std::string detail) {
-  return Problem{.kind = ProblemKind::kMalformedRequest, .detail = std::move(detail)};
-}
-
 bool is_token_char(char c) {
   constexpr std::string_view kMarks = "!#$%&'*+-.^_`|~";
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || kMarks.find(c) != std::string_view::npos;
@@ -51,10 +47,10 @@ std::optional<std::string_view> next_line(std::string_view& rest) {
 }
 
 std::optional<Problem> parse_target(std::string_view target, const HeadLimits& limits, RequestHead& head) {
-  if (target.empty() || target.front() != '/') return malformed("the request target must be a path");
+  if (target.empty() || target.front() != '/') return malformed_request("the request target must be a path");
   const bool is_plain =
       std::all_of(target.begin(), target.end(), [](char c) { return c > ' ' && c < '\x7f'; });
-  if (!is_plain) return malformed("the request target holds characters that must be percent-encoded");
+  if (!is_plain) return malformed_request("the request target holds characters that must be percent-encoded");
   const std::size_t mark = target.find('?');
   const std::string_view path = target.substr(0, mark);
   if (path.size() > limits.max_path_bytes)
@@ -63,7 +59,7 @@ std::optional<Problem> parse_target(std::string_view target, const HeadLimits& l
                    .limit = static_cast<double>(limits.max_path_bytes),
                    .actual = static_cast<double>(path.size())};
   auto decoded = percent_decode(path, false);
-  if (!decoded) return malformed("the path holds a broken escape, NUL or a control character");
+  if (!decoded) return malformed_request("the path holds a broken escape, NUL or a control character");
   head.path = std::move(*decoded);
   if (mark == std::string_view::npos) return std::nullopt;
   std::string_view query = target.substr(mark + 1);
@@ -76,7 +72,8 @@ std::optional<Problem> parse_target(std::string_view target, const HeadLimits& l
     auto name = percent_decode(pair.substr(0, equals), true);
     auto value =
         percent_decode(equals == std::string_view::npos ? std::string_view{} : pair.substr(equals + 1), true);
-    if (!name || !value) return malformed("the query holds a broken escape, NUL or a control character");
+    if (!name || !value)
+      return malformed_request("the query holds a broken escape, NUL or a control character");
     head.query.emplace_back(std::move(*name), std::move(*value));
   }
   return std::nullopt;
@@ -87,12 +84,13 @@ std::optional<Problem> parse_request_line(std::string_view line, const HeadLimit
   const std::size_t first = line.find(' ');
   const std::size_t last = line.rfind(' ');
   if (first == std::string_view::npos || first == last)
-    return malformed("the request line is not METHOD TARGET VERSION");
+    return malformed_request("the request line is not METHOD TARGET VERSION");
   const std::string_view method = line.substr(0, first);
   const std::string_view version = line.substr(last + 1);
-  if (!is_token(method)) return malformed("the method is not a token");
+  if (!is_token(method)) return malformed_request("the method is not a token");
   if (version != "HTTP/1.1" && version != "HTTP/1.0") {
-    if (version.substr(0, 5) != "HTTP/") return malformed("the request line is not METHOD TARGET VERSION");
+    if (version.substr(0, 5) != "HTTP/")
+      return malformed_request("the request line is not METHOD TARGET VERSION");
     return Problem{.kind = ProblemKind::kHttpVersion, .detail = "this server speaks HTTP/1.1"};
   }
   const auto known = method_of(method);
@@ -103,16 +101,17 @@ std::optional<Problem> parse_request_line(std::string_view line, const HeadLimit
 }
 
 std::optional<Problem> parse_header_line(std::string_view line, RequestHead& head) {
-  if (line.front() == ' ' || line.front() == '\t') return malformed("folded header lines are not accepted");
+  if (line.front() == ' ' || line.front() == '\t')
+    return malformed_request("folded header lines are not accepted");
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos || !is_token(line.substr(0, colon)))
-    return malformed("a header line is not NAME: VALUE");
+    return malformed_request("a header line is not NAME: VALUE");
   const std::string_view value = trimmed(line.substr(colon + 1));
   const bool has_control = std::any_of(value.begin(), value.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);
     return (byte < 0x20 && byte != '\t') || byte == 0x7f;
   });
-  if (has_control) return malformed("a header value holds a control character");
+  if (has_control) return malformed_request("a header value holds a control character");
   head.headers.emplace_back(lower(line.substr(0, colon)), std::string(value));
   return std::nullopt;
 }
@@ -126,18 +125,18 @@ std::size_t count_of(const RequestHead& head, std::string_view name) {
 std::optional<Problem> check_length(RequestHead& head) {
   const std::size_t length_count = count_of(head, "content-length");
   if (const auto coding = head.header("transfer-encoding")) {
-    if (length_count > 0) return malformed("Transfer-Encoding and Content-Length exclude each other");
+    if (length_count > 0) return malformed_request("Transfer-Encoding and Content-Length exclude each other");
     if (lower(*coding) != "chunked")
       return Problem{.kind = ProblemKind::kNotImplemented, .detail = "this transfer coding is not supported"};
     return Problem{.kind = ProblemKind::kLengthRequired,
                    .detail = "send Content-Length; chunked bodies are not accepted"};
   }
-  if (length_count > 1) return malformed("Content-Length is given more than once");
+  if (length_count > 1) return malformed_request("Content-Length is given more than once");
   if (length_count == 1) {
     const std::string_view text = *head.header("content-length");
     const bool digits = !text.empty() && text.size() <= 18 &&
                         std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
-    if (!digits) return malformed("Content-Length is not a number of at most 18 digits");
+    if (!digits) return malformed_request("Content-Length is not a number of at most 18 digits");
     std::uint64_t length = 0;
     std::from_chars(text.data(), text.data() + text.size(), length);
     head.content_length = length;
@@ -150,7 +149,7 @@ std::optional<Problem> check_length(RequestHead& head) {
 }
 
 std::optional<Problem> check_framing(RequestHead& head) {
-  if (count_of(head, "host") != 1) return malformed("exactly one Host header is needed");
+  if (count_of(head, "host") != 1) return malformed_request("exactly one Host header is needed");
   if (auto problem = check_length(head)) return problem;
   if (const auto coding = head.header("content-encoding"); coding && lower(*coding) != "identity")
     return Problem{.kind = ProblemKind::kUnsupportedMediaType,
@@ -211,14 +210,14 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
 
 std::variant<RequestHead, Problem> parse_head(std::string_view bytes, const HeadLimits& limits) {
   RequestHead head;
-  if (bytes.find('\0') != std::string_view::npos) return malformed("the head holds a NUL");
+  if (bytes.find('\0') != std::string_view::npos) return malformed_request("the head holds a NUL");
   std::string_view rest = bytes;
   const auto request_line = next_line(rest);
-  if (!request_line) return malformed("the request line does not end with CR LF");
+  if (!request_line) return malformed_request("the request line does not end with CR LF");
   if (auto problem = parse_request_line(*request_line, limits, head)) return std::move(*problem);
   while (true) {
     const auto line = next_line(rest);
-    if (!line) return malformed("a header line does not end with CR LF");
+    if (!line) return malformed_request("a header line does not end with CR LF");
     if (line->empty()) break;
     if (head.headers.size() == limits.max_headers)
       return Problem{.kind = ProblemKind::kHeadTooLarge,

@@ -1,5 +1,7 @@
 #include "server/http/problem_response.h"
 
+#include <utility>
+
 #include "protocol/json/documents.h"
 
 namespace pointwright::server {
@@ -20,6 +22,14 @@ Response problem_response(Problem problem, std::string_view instance, std::strin
 
 Response problem_response(Problem problem, const Request& request) {
   return problem_response(std::move(problem), request.head.path, request.id);
+}
+
+Response not_found(std::string detail, const Request& request) {
+  return problem_response(Problem{.kind = ProblemKind::kNotFound, .detail = std::move(detail)}, request);
+}
+
+Problem malformed_request(std::string detail) {
+  return Problem{.kind = ProblemKind::kMalformedRequest, .detail = std::move(detail)};
 }
 
 }  // namespace pointwright::server

@@ -14,7 +14,7 @@
 namespace pointwright {
 namespace {
 
-Error too_large(const std::string& path, std::uint64_t limit, std::uint64_t actual) {
+Error path_too_large(const std::string& path, std::uint64_t limit, std::uint64_t actual) {
   return Error{.code = ErrorCode::kTooLarge,
                .message = path + " is larger than " + std::to_string(limit) + " bytes",
                .field = "path",
@@ -50,7 +50,7 @@ Result<std::vector<std::byte>> read_file(const std::string& path, std::uint64_t 
   if (!file.is_open() || fstat(file.get(), &info) != 0) return file_error("cannot open", path, errno);
   if (!S_ISREG(info.st_mode)) return file_error("cannot read", path, S_ISDIR(info.st_mode) ? EISDIR : EINVAL);
   const auto size = static_cast<std::uint64_t>(info.st_size);
-  if (size > max_bytes) return too_large(path, max_bytes, size);
+  if (size > max_bytes) return path_too_large(path, max_bytes, size);
   std::vector<std::byte> bytes(size);
   std::size_t at = 0;
   while (at < bytes.size()) {

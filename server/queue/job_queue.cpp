@@ -100,7 +100,8 @@ std::optional<Problem> JobQueue::check_locked() const {
   return Problem{.kind = ProblemKind::kTooMany,
                  .detail = "the server holds as many jobs as it may (max_jobs), and none has ended",
                  .limit = static_cast<double>(settings_.limits.max_jobs),
-                 .actual = static_cast<double>(entries_.size() + 1)};
+                 .actual = static_cast<double>(entries_.size() + 1),
+                 .retry_after = protocol::kPassingSeconds};
 }
 
 Outcome<std::vector<std::string>> JobQueue::command_of(const KeptJob& job) const {

@@ -35,6 +35,9 @@ struct Document {
   }
 };
 
+/// The box of samples in model coordinates; of none: the origin.
+protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin);
+
 using SharedDocument = std::shared_ptr<const Document>;
 
 }  // namespace pointwright::server

@@ -17,12 +17,6 @@ namespace {
 /// lower number is another drag's.
 constexpr std::chrono::seconds kReorderWindow{1};
 
-protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) {
-  const Box3f box = bounds_of(position);
-  if (box.is_empty()) return {.min = origin, .max = origin};
-  return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
-}
-
 Document starting_document(const SessionParams& params) {
   Document document = params.kept != nullptr ? *params.kept : Document{};
   document.name = params.name;
@@ -46,6 +40,12 @@ float detail_range_of(const SurfaceState& state) {
 }
 
 }  // namespace
+
+protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) {
+  const Box3f box = bounds_of(position);
+  if (box.is_empty()) return {.min = origin, .max = origin};
+  return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
+}
 
 Session::Session(SessionParams params, SessionServices services)
     : params_(std::move(params)),

@@ -13,14 +13,7 @@ using protocol::Problem;
 using protocol::ProblemKind;
 using SteadyClock = std::chrono::steady_clock;
 
-namespace {
-
-protocol::ModelBounds model_bounds(const Points& position, const Vec3d& origin) {
-  const Box3f box = bounds_of(position);
-  return {.min = origin + box.min.cast<double>(), .max = origin + box.max.cast<double>()};
-}
-
-}  // namespace
+namespace {}  // namespace
 
 template <typename T>
 Outcome<Done> Session::keep(const Document& before, const Document& after, const Seal<T>& seal,

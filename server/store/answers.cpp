@@ -14,8 +14,43 @@ using protocol::ProblemKind;
 namespace {
 
 constexpr std::int64_t kKeptMs = 24LL * 60 * 60 * 1000;
-/// So many callers at least share the room for answers.
+/// No caller has a greater part of the room for answers than one of so many.
 constexpr std::uint64_t kCallers = 16;
+/// Room is made for a part of all answers at a time: that counts and sorts them.
+constexpr std::uint64_t kRoomParts = 64;
+
+void forget_oldest(Database::Access& access, const std::string& caller, std::int64_t count) {
+  access.run(
+      "DELETE FROM answers WHERE caller = ? AND key IN "
+      "(SELECT key FROM answers WHERE caller = ? ORDER BY created LIMIT ?)",
+      caller, caller, count);
+}
+
+std::int64_t count_all(Database::Access& access) {
+  Statement count = access.query("SELECT count(*) FROM answers");
+  count.step();
+  return count.integer(0);
+}
+
+/// Who has most of them loses the oldest ones, until there are `goal` of them. Cost: O(N log N), few times
+void shrink_to(Database::Access& access, std::int64_t goal) {
+  for (std::int64_t total = count_all(access); total > goal; total = count_all(access)) {
+    std::string caller;
+    std::int64_t most = 0;
+    std::int64_t next = 0;
+    {
+      Statement callers =
+          access.query("SELECT caller, count(*) FROM answers GROUP BY caller ORDER BY 2 DESC, 1 LIMIT 2");
+      if (!callers.step()) return;
+      caller = callers.text(0);
+      most = callers.integer(1);
+      if (callers.step()) next = callers.integer(1);
+    }
+    // Down to the next one's number; of equals each gives a part.
+    const std::int64_t part = (total - goal) / static_cast<std::int64_t>(kCallers);
+    forget_oldest(access, caller, std::clamp<std::int64_t>(std::max(most - next, part), 1, total - goal));
+  }
+}
 
 }  // namespace
 
@@ -60,6 +95,30 @@ std::optional<KeptAnswer> Answers::find(const std::string& caller, const std::st
   });
 }
 
+Outcome<Done> Answers::make_room(const std::string& caller) {
+  // Nobody takes keys away from callers that have fewer of them.
+  const std::lock_guard lock(room_mutex_);
+  const auto part = static_cast<std::int64_t>(std::max<std::uint64_t>(most_ / kCallers, 1));
+  const auto most = static_cast<std::int64_t>(most_);
+  std::int64_t bound = bound_.value_or(most) + 1;
+  auto made = database_.change([&](Database::Access& access) -> Outcome<Done> {
+    access.run("DELETE FROM answers WHERE created <= ?", now_ms() - kKeptMs);
+    std::int64_t own = 0;
+    {
+      Statement count = access.query("SELECT count(*) FROM answers WHERE caller = ?", caller);
+      count.step();
+      own = count.integer(0);
+    }
+    if (own >= part) forget_oldest(access, caller, own - part + 1);
+    if (bound <= most) return Done{};
+    if (count_all(access) >= most) shrink_to(access, most - 1 - most / static_cast<std::int64_t>(kRoomParts));
+    bound = count_all(access) + 1;
+    return Done{};
+  });
+  if (made.ok()) bound_ = bound;
+  return made;
+}
+
 Outcome<Answers::Claim> Answers::claim(const std::string& caller, const std::string& key,
                                        const std::string& fingerprint) {
   const Name name(caller, key);
@@ -78,32 +137,8 @@ Outcome<Answers::Claim> Answers::claim(const std::string& caller, const std::str
     return Problem{.kind = ProblemKind::kKeyReused,
                    .detail = "the Idempotency-Key came before, with another request"};
   }
-  // Nobody takes the keys away from others: beyond its part of them a caller loses its own oldest.
-  const auto part = static_cast<std::int64_t>(std::max<std::uint64_t>(most_ / kCallers, 1));
-  auto room = database_.change([&](Database::Access& access) -> Outcome<std::uint64_t> {
-    access.run("DELETE FROM answers WHERE created <= ?", now_ms() - kKeptMs);
-    std::int64_t own = 0;
-    {
-      Statement count = access.query("SELECT count(*) FROM answers WHERE caller = ?", caller);
-      count.step();
-      own = count.integer(0);
-    }
-    if (own >= part)
-      access.run(
-          "DELETE FROM answers WHERE caller = ? AND key IN (SELECT key FROM answers WHERE caller = ? ORDER "
-          "BY "
-          "created LIMIT ?)",
-          caller, caller, own - part + 1);
-    Statement count = access.query("SELECT count(*) FROM answers");
-    count.step();
-    return static_cast<std::uint64_t>(count.integer(0));
-  });
+  auto room = make_room(caller);
   if (!room.ok()) return room.problem();
-  if (room.value() >= most_)
-    return Problem{.kind = ProblemKind::kTooMany,
-                   .detail = "the server remembers as many Idempotency-Keys as it may; each for a day",
-                   .limit = static_cast<double>(most_),
-                   .actual = static_cast<double>(room.value())};
   return Claim(std::move(turn));
 }
 

@@ -25,7 +25,8 @@ class Answers {
   using Turn = std::shared_ptr<const void>;
   /// Its first answer; or a turn to answer it now.
   using Claim = std::variant<KeptAnswer, Turn>;
-  /// Problems: the key came with another request, the first one is still under way, too many keys
+  /// Where as many are kept as may be, those are forgotten first that came first, of whoever has most.
+  /// Problems: the key came with another request, the first one is still under way
   Outcome<Claim> claim(const std::string& caller, const std::string& key, const std::string& fingerprint);
   /// Keeps an answer as part of a change; one that is there already stays.
   static void put(Database::Access& access, const KeptAnswer& answer);
@@ -40,8 +41,13 @@ class Answers {
   };
   [[nodiscard]] std::optional<KeptAnswer> find(const std::string& caller, const std::string& key);
 
+  /// For one more answer of the caller.
+  Outcome<Done> make_room(const std::string& caller);
+
   Database& database_;
   const std::uint64_t most_;
+  std::mutex room_mutex_;              // guards bound_
+  std::optional<std::int64_t> bound_;  // no more answers than this are there, those that are due included
   std::shared_ptr<UnderWay> under_way_ = std::make_shared<UnderWay>();
 };
 

@@ -22,7 +22,7 @@ void add_column(std::string& hashes, const T* values, std::size_t count) {
   hashes += sha256_hex({reinterpret_cast<const std::byte*>(values), count * sizeof(T)});
 }
 
-auto has_id(const std::string& id) {
+auto is_cloud(const std::string& id) {
   return [&id](const SharedCloud& cloud) { return cloud->document.id == id; };
 }
 
@@ -148,7 +148,7 @@ Outcome<SharedCloud> CloudStore::add(NewCloud cloud, const BlobContent& file,
 
 SharedCloud CloudStore::find(const std::string& id) const {
   const std::lock_guard lock(mutex_);
-  const auto it = std::find_if(clouds_.begin(), clouds_.end(), has_id(id));
+  const auto it = std::find_if(clouds_.begin(), clouds_.end(), is_cloud(id));
   return it == clouds_.end() ? nullptr : *it;
 }
 
@@ -194,7 +194,7 @@ void CloudStore::let_go(const StoredCloud& cloud) const {
 
 std::shared_ptr<const void> CloudStore::use(const std::string& id) const {
   const std::lock_guard lock(mutex_);
-  const auto it = std::find_if(clouds_.begin(), clouds_.end(), has_id(id));
+  const auto it = std::find_if(clouds_.begin(), clouds_.end(), is_cloud(id));
   if (it == clouds_.end()) return nullptr;
   ++(*it)->users;
   return {it->get(), [cloud = *it](const void*) { --cloud->users; }};
@@ -207,7 +207,7 @@ std::vector<SharedCloud> CloudStore::list() const {
 
 Outcome<Done> CloudStore::remove(const std::string& id) {
   const std::lock_guard lock(mutex_);
-  const auto it = std::find_if(clouds_.begin(), clouds_.end(), has_id(id));
+  const auto it = std::find_if(clouds_.begin(), clouds_.end(), is_cloud(id));
   if (it == clouds_.end()) return Problem{.kind = ProblemKind::kNotFound, .detail = "there is no such cloud"};
   if ((*it)->users > 0)
     return Problem{.kind = ProblemKind::kCloudInUse,

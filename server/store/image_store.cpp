@@ -27,7 +27,7 @@ std::vector<std::string> channels_of(const Image& image) {
   return names;
 }
 
-auto has_id(const std::string& id) {
+auto is_image(const std::string& id) {
   return [&id](const SharedImage& image) { return image->document.id == id; };
 }
 
@@ -165,7 +165,7 @@ Outcome<std::shared_ptr<const ImageContent>> ImageStore::content_of(const ImageD
 
 SharedImage ImageStore::find(const std::string& id) const {
   const std::lock_guard lock(mutex_);
-  const auto it = std::find_if(images_.begin(), images_.end(), has_id(id));
+  const auto it = std::find_if(images_.begin(), images_.end(), is_image(id));
   return it == images_.end() ? nullptr : *it;
 }
 
@@ -176,7 +176,7 @@ std::vector<SharedImage> ImageStore::list() const {
 
 Outcome<Done> ImageStore::remove(const std::string& id) {
   const std::lock_guard lock(mutex_);
-  const auto it = std::find_if(images_.begin(), images_.end(), has_id(id));
+  const auto it = std::find_if(images_.begin(), images_.end(), is_image(id));
   if (it == images_.end()) return Problem{.kind = ProblemKind::kNotFound, .detail = "there is no such image"};
   if (archive_ != nullptr)
     if (auto removed = archive_->remove_image(id, (*it)->sha256); !removed.ok()) return removed;

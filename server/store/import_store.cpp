@@ -63,7 +63,8 @@ Outcome<ImportDocument> ImportStore::start(NewImport import, Work work) {
       return Problem{.kind = ProblemKind::kTooMany,
                      .detail = "as many imports of the token are under way as may be (token_imports)",
                      .limit = static_cast<double>(token_imports_),
-                     .actual = static_cast<double>(under_way + 1)};
+                     .actual = static_cast<double>(under_way + 1),
+                     .retry_after = protocol::kPassingSeconds};
     if (entries_.size() >= max_imports_) {
       const auto ended = displaced(
           entries_, [](const Entry& each) { return each.owner; },
@@ -73,7 +74,8 @@ Outcome<ImportDocument> ImportStore::start(NewImport import, Work work) {
         return Problem{.kind = ProblemKind::kTooMany,
                        .detail = "as many imports are under way as may be (max_imports)",
                        .limit = static_cast<double>(max_imports_),
-                       .actual = static_cast<double>(entries_.size() + 1)};
+                       .actual = static_cast<double>(entries_.size() + 1),
+                       .retry_after = protocol::kPassingSeconds};
       std::erase(entries_, ended);
     }
     entries_.push_back(entry);

@@ -391,6 +391,7 @@ TEST_CASE("quotas bound one token, with the limit in the answer, and nobody else
   Guarded guarded;
   const std::string small = guarded.add(
       "Small", "edit", {"--sessions", "1", "--stored-bytes", std::to_string(sheet().size() + 10)});
+  const std::string few = guarded.add("Few", "edit", {"--clouds", "1", "--images", "0"});
   const std::string slow = guarded.add("Slow", "view", {"--requests-per-second", "1"});
   const std::string daily = guarded.add("Daily", "edit", {"--upload-bytes-per-day", "100"});
   ::kill(guarded.daemon.pid(), SIGHUP);
@@ -402,7 +403,8 @@ TEST_CASE("quotas bound one token, with the limit in the answer, and nobody else
       guarded.ask(small, "POST", "/v1/clouds", sheet(), "Content-Type: application/x-ply\r\n");
   CHECK(second.status == 429);
   CHECK(second.json()["limit"] == sheet().size() + 10);
-  CHECK(second.headers.count("retry-after") == 1);
+  // Time does not lift it.
+  CHECK(second.headers.count("retry-after") == 0);
   const std::string session = guarded.open(small, cloud);
   const Reply more = guarded.ask(small, "POST", "/v1/sessions", R"({"cloud":")" + cloud + "\"}");
   CHECK(more.status == 429);
@@ -412,6 +414,20 @@ TEST_CASE("quotas bound one token, with the limit in the answer, and nobody else
   CHECK(quotas["sessions"]["used"] == 1);
   CHECK(quotas["samples"]["used"] == 400);
   CHECK(quotas["stored_bytes"]["used"] == sheet().size());
+  // However small they are, their number is bounded, too.
+  const std::string only = guarded.upload(few);
+  const Reply other = guarded.ask(few, "POST", "/v1/clouds", sheet(), "Content-Type: application/x-ply\r\n");
+  CHECK(other.status == 429);
+  CHECK(other.json()["detail"].get<std::string>().find("quota clouds") != std::string::npos);
+  CHECK(guarded
+            .ask(few, "POST", "/v1/images", grey_png(1, 1, [](auto, auto) { return 0; }),
+                 "Content-Type: image/png\r\n")
+            .json()["detail"]
+            .get<std::string>()
+            .find("quota images") != std::string::npos);
+  CHECK(guarded.get(few, "/v1/info").json()["caller"]["quotas"]["clouds"]["used"] == 1);
+  CHECK(guarded.ask(few, "DELETE", "/v1/clouds/" + only).status == 204);
+  guarded.upload(few);
   // What is deleted counts no more.
   CHECK(guarded.ask(small, "DELETE", "/v1/sessions/" + session).status == 204);
   CHECK(guarded.get(small, "/v1/info").json()["caller"]["quotas"]["sessions"]["used"] == 0);
@@ -422,7 +438,11 @@ TEST_CASE("quotas bound one token, with the limit in the answer, and nobody else
   CHECK(upload.status == 429);
   CHECK(upload.json()["limit"] == 100);
   int refused = 0;
-  for (int i = 0; i < 20; ++i) refused += guarded.get(slow, "/v1/info").status == 429 ? 1 : 0;
+  for (int i = 0; i < 20; ++i) {
+    const Reply reply = guarded.get(slow, "/v1/info");
+    refused += reply.status == 429 ? 1 : 0;
+    CHECK(reply.headers.count("retry-after") == (reply.status == 429 ? 1U : 0U));
+  }
   CHECK(refused > 0);
   CHECK(guarded.get(guarded.ann, "/v1/info").status == 200);
 }

@@ -61,6 +61,16 @@ class Answers(CommandLine):
         self.assertEqual(len({post.headers["Idempotency-Key"] for post in posts}), 1)
         self.assertEqual({post.headers["Authorization"] for post in posts}, {"Bearer secret"})
 
+    def test_what_time_does_not_lift_is_not_asked_again(self):
+        full = {"type": "/problems/too-many", "title": "Full", "detail": "no more clouds", "status": 429}
+        for headers, asked in (({}, 1), ({"Retry-After": "0"}, 3)):
+            with self.subTest(headers):
+                answers = [document(full, 429, headers)] * 2
+                fake = self.serve(lambda request: answers.pop(0) if answers else document({"clouds": []}))
+                ended = self.ask(fake, "cloud", "list")
+                self.assertEqual(ended.returncode == 0, asked == 3, ended.stderr)
+                self.assertEqual(len(fake.requests), asked)
+
     def test_a_lost_answer_to_a_change_is_not_risked_twice(self):
         fake = self.serve(
             lambda request: document({"limits": {}, "features": []}) if request.path == "/v1/info" else None

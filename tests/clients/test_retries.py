@@ -9,7 +9,7 @@ import unittest
 
 import support
 from pointwright import (
-    Client, JobFailed, NotFound, NotSupported, Overloaded, ServerError, TooLarge, Unreachable, WaitedTooLong,
+    Client, JobFailed, NotFound, NotSupported, Overloaded, QuotaReached, ServerError, TooLarge, Unreachable, WaitedTooLong,
 )  # fmt: skip
 
 BUSY = {"type": "/problems/overloaded", "title": "Busy", "status": 503, "limit": 4, "actual": 5}
@@ -45,6 +45,17 @@ class Retries(Served):
             client.info()
         self.assertEqual((caught.exception.limit, caught.exception.actual), (4, 5))
         self.assertEqual(len(fake.requests), 4)
+
+    def test_what_time_does_not_lift_is_not_asked_again(self):
+        full = {"type": "/problems/too-many", "title": "A quota is used up", "status": 429, "limit": 1, "actual": 2}
+        fake, client = self.serve(lambda request: document(full, 429))
+        with self.assertRaises(QuotaReached) as caught:
+            client.info()
+        self.assertEqual((caught.exception.limit, caught.exception.actual), (1, 2))
+        self.assertEqual(len(fake.requests), 1)
+        passing, client = self.serve(lambda request: document(full, 429, {"Retry-After": "0"}))
+        self.assertRaises(Overloaded, client.info)
+        self.assertEqual(len(passing.requests), 4)
 
     def test_a_broken_connection_is_tried_again_where_that_does_no_harm(self):
         answers = [None, None, document({"sessions": []})]

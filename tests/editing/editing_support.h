@@ -17,6 +17,10 @@
 
 namespace pointwright::test {
 
+/// Bits of a painted region's marks.
+inline constexpr std::uint8_t kZeroBit = 1;
+inline constexpr std::uint8_t kOneBit = 2;
+
 inline Points points_of(const std::vector<Vec3f>& list) {
   Points points(list.size());
   for (std::size_t i = 0; i < list.size(); ++i) points.set(i, list[i]);

@@ -9,9 +9,6 @@
 namespace pointwright {
 namespace {
 
-constexpr std::uint8_t kZeroBit = 1;
-constexpr std::uint8_t kOneBit = 2;
-
 // A flat floor (y < 0) and a wall that stands on its edge (y = 0, z > 0), 20 samples wide, spacing 0.1; and
 // an island far away.
 struct Corner {
@@ -55,7 +52,7 @@ struct Corner {
   void check(const Marks& marks, const Test& inside) const {
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < marks.size(); ++i)
-      wrong += ((marks[i] & kZeroBit) != 0) != inside(position[i]);
+      wrong += ((marks[i] & test::kZeroBit) != 0) != inside(position[i]);
     CHECK(wrong == 0);
   }
 };
@@ -78,7 +75,7 @@ TEST_CASE("a flood fills what is connected, bounded by angle, radius and the oth
   Marks fence(corner.position.size(), 0);
   for (std::size_t i = 0; i < fence.size(); ++i) {
     const float y = corner.position[i].y();
-    if (y < -0.35F && y > -0.75F) fence[i] = kOneBit;
+    if (y < -0.35F && y > -0.75F) fence[i] = test::kOneBit;
   }
   const Marks held = corner.filled({.seed = seed, .stop_at_other = true}, fence);
   corner.check(held, [](const Vec3f& p) { return p.x() < 10.0F && p.y() < -0.75F; });
@@ -98,11 +95,11 @@ TEST_CASE("floods are the same on any machine, steal, reach duplicates and take 
   const Points row = test::points_of({{0, 0, 0}, {1, 0, 0}, {1, 0, 0}, {1, 0, 0}, {2, 0, 0}});
   const NeighborGraph graph = build_neighbor_graph(row, 2);
   const Vec3d origin = Vec3d::Zero();
-  Marks marks(5, kOneBit);
+  Marks marks(5, test::kOneBit);
   CHECK(paint({.mode = PaintMode::kFlood, .steal = true, .flood = {.seed = Vec3d(-1.0, 0.0, 0.0)}},
               RegionKind::kZero, {.position = row, .normal = row, .origin = origin, .graph = &graph},
               marks) == 5);
-  CHECK(marks == Marks(5, kZeroBit));
+  CHECK(marks == Marks(5, test::kZeroBit));
 
   for (const std::size_t n : {0UL, 1UL, 2UL, 17UL}) {
     const Points one_place(n);

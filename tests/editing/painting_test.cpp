@@ -12,9 +12,6 @@
 namespace pointwright {
 namespace {
 
-constexpr std::uint8_t kZeroBit = 1;
-constexpr std::uint8_t kOneBit = 2;
-
 // Four samples at x = 0, 1, 2, 3; the last one faces away.
 struct Row {
   Points position = test::points_of({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}});
@@ -72,11 +69,11 @@ TEST_CASE("a region's samples are painted by their places among the samples, thr
   use.facing.reset();
   use.mode = PaintMode::kSet;
   CHECK(row.apply(use, RegionKind::kOne) == 2);
-  CHECK(row.marks == Marks{0, kOneBit, 0, kZeroBit | kOneBit});
+  CHECK(row.marks == Marks{0, test::kOneBit, 0, test::kZeroBit | test::kOneBit});
   row.apply(from_x(0.5, PaintMode::kAdd));
   use.mode = PaintMode::kIntersect;
   CHECK(row.apply(use) == 1);
-  CHECK(row.marks == Marks{0, kZeroBit | kOneBit, 0, kZeroBit | kOneBit});
+  CHECK(row.marks == Marks{0, test::kZeroBit | test::kOneBit, 0, test::kZeroBit | test::kOneBit});
 }
 
 TEST_CASE("a facing brush does not paint samples that look away") {
@@ -96,15 +93,16 @@ TEST_CASE("without steal a sample ends in both regions, with it in the newer one
   row.apply(from_x(0.5, PaintMode::kAdd), RegionKind::kZero);
   Row both = row;
   CHECK(both.apply(from_x(1.5, PaintMode::kAdd), RegionKind::kOne) == 2);
-  CHECK(both.marks == Marks{0, kZeroBit, kZeroBit | kOneBit, kZeroBit | kOneBit});
+  CHECK(both.marks ==
+        Marks{0, test::kZeroBit, test::kZeroBit | test::kOneBit, test::kZeroBit | test::kOneBit});
   PaintOperation thief = from_x(1.5, PaintMode::kSet);
   thief.steal = true;
   CHECK(row.apply(thief, RegionKind::kOne) == 2);
-  CHECK(row.marks == Marks{0, kZeroBit, kOneBit, kOneBit});
+  CHECK(row.marks == Marks{0, test::kZeroBit, test::kOneBit, test::kOneBit});
   PaintOperation eraser = from_x(0.0, PaintMode::kRemove);
   eraser.steal = true;  // nobody joins, so nobody leaves the other region
   CHECK(row.apply(eraser, RegionKind::kZero) == 1);
-  CHECK(row.marks == Marks{0, 0, kOneBit, kOneBit});
+  CHECK(row.marks == Marks{0, 0, test::kOneBit, test::kOneBit});
 }
 
 PaintOperation of_mode(PaintMode mode, double distance = 0.0) {
@@ -113,36 +111,36 @@ PaintOperation of_mode(PaintMode mode, double distance = 0.0) {
 
 TEST_CASE("inverting swaps members and others, clearing empties the region; other regions stay") {
   Row row;
-  row.marks = {kZeroBit, 0, kOneBit, kZeroBit | kOneBit};
+  row.marks = {test::kZeroBit, 0, test::kOneBit, test::kZeroBit | test::kOneBit};
   Row thief = row;
   CHECK(row.apply(of_mode(PaintMode::kInvert)) == 4);
-  CHECK(row.marks == Marks{0, kZeroBit, kZeroBit | kOneBit, kOneBit});
+  CHECK(row.marks == Marks{0, test::kZeroBit, test::kZeroBit | test::kOneBit, test::kOneBit});
   CHECK(row.apply(of_mode(PaintMode::kInvert)) == 4);
-  CHECK(row.marks == Marks{kZeroBit, 0, kOneBit, kZeroBit | kOneBit});
+  CHECK(row.marks == Marks{test::kZeroBit, 0, test::kOneBit, test::kZeroBit | test::kOneBit});
   PaintOperation steal = of_mode(PaintMode::kInvert);
   steal.steal = true;  // who joins leaves the other region, who leaves keeps it
   CHECK(thief.apply(steal) == 4);
-  CHECK(thief.marks == Marks{0, kZeroBit, kZeroBit, kOneBit});
+  CHECK(thief.marks == Marks{0, test::kZeroBit, test::kZeroBit, test::kOneBit});
   CHECK(row.apply(of_mode(PaintMode::kClear)) == 2);
-  CHECK(row.marks == Marks{0, 0, kOneBit, kOneBit});
+  CHECK(row.marks == Marks{0, 0, test::kOneBit, test::kOneBit});
   CHECK(row.apply(of_mode(PaintMode::kClear)) == 0);
 }
 
 TEST_CASE(
     "growing takes in what lies within the distance, shrinking gives up what lies that near to others") {
   Row row;
-  row.marks = {kOneBit, 0, kOneBit, kZeroBit};
+  row.marks = {test::kOneBit, 0, test::kOneBit, test::kZeroBit};
   CHECK(row.apply(of_mode(PaintMode::kGrow, 0.999)) == 0);
   Row stolen = row;
   CHECK(row.apply(of_mode(PaintMode::kGrow, 1.0)) == 1);  // the distance itself counts
-  CHECK(row.marks == Marks{kOneBit, 0, kZeroBit | kOneBit, kZeroBit});
+  CHECK(row.marks == Marks{test::kOneBit, 0, test::kZeroBit | test::kOneBit, test::kZeroBit});
   PaintOperation steal = of_mode(PaintMode::kGrow, 3.0);
   steal.steal = true;
   CHECK(stolen.apply(steal) == 3);
-  CHECK(stolen.marks == Marks{kZeroBit, kZeroBit, kZeroBit, kZeroBit});
+  CHECK(stolen.marks == Marks{test::kZeroBit, test::kZeroBit, test::kZeroBit, test::kZeroBit});
   CHECK(stolen.apply(of_mode(PaintMode::kShrink, 100.0)) == 0);  // no others to be near to
   CHECK(row.apply(of_mode(PaintMode::kShrink, 1.5)) == 1);
-  CHECK(row.marks == Marks{kOneBit, 0, kOneBit, kZeroBit});
+  CHECK(row.marks == Marks{test::kOneBit, 0, test::kOneBit, test::kZeroBit});
   CHECK(row.apply(of_mode(PaintMode::kClear)) == 1);
   CHECK(row.apply(of_mode(PaintMode::kGrow, 100.0)) == 0);  // no member to grow from
 }
@@ -206,7 +204,7 @@ TEST_CASE("culling never changes what a shape covers") {
     for (std::size_t i = 0; i < n; ++i) {
       const bool inside = contains(shape, origin + position[i].cast<double>());
       expected += inside ? 1 : 0;
-      wrong += (marks[i] == kOneBit) != inside;
+      wrong += (marks[i] == test::kOneBit) != inside;
     }
     CHECK(wrong == 0);
     CHECK(changed == expected);
@@ -271,7 +269,7 @@ TEST_CASE("painting works on any number of samples") {
     const PaintSurface surface{.position = position, .normal = position, .origin = origin};
     Marks grown(n, 0);
     CHECK(paint(of_mode(PaintMode::kGrow, 1e-30), RegionKind::kZero, surface, grown) == 0);
-    if (n > 0) grown[0] = kZeroBit;
+    if (n > 0) grown[0] = test::kZeroBit;
     CHECK(paint(of_mode(PaintMode::kGrow, 1e-30), RegionKind::kZero, surface, grown) == (n > 0 ? n - 1 : 0));
     CHECK(paint(of_mode(PaintMode::kInvert), RegionKind::kZero, surface, grown) == n);
     CHECK(paint(of_mode(PaintMode::kShrink, 1.0), RegionKind::kZero, surface, grown) == 0);

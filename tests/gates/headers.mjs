@@ -1,9 +1,9 @@
-// Every header compiles alone: whoever includes it needs nothing of ours before it. A header that a compiled source includes
+// Every header compiles alone: whoever includes it needs nothing of ours before it. A header that a compiled file includes
 // before anything else has been compiled alone by the build; the others are compiled here, with the build's precompiled
 // headers where there are any, and what passed is remembered by content, as clang-tidy's sources are. Of the standard library
 // a header names what it uses itself: that is looked for in the text, because compiling shows it badly (the library's headers
 // include each other) and with precompiled headers not at all.
-import { existsSync, mkdirSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { dirname, resolve } from "node:path";
 import {
   contentOf,
@@ -71,10 +71,22 @@ function missingIncludes(path) {
 /** The first file that a source includes, as it is written there. */
 const firstInclude = (path) => contentOf(path)?.match(/^\s*#\s*include\s+["<](.*)[">]/m)?.[1];
 
+/** The headers that the release build has compiled alone: those that begin a batch, or a source in none. */
+function compiledAlone() {
+  const commands = resolve(root, "build/release/compile_commands.json");
+  if (!existsSync(commands)) return new Set();
+  return new Set(
+    JSON.parse(readFileSync(commands, "utf8")).map(({ file }) => {
+      const source = file.includes("/Unity/") ? readFileSync(file, "utf8").match(/#include "(.*)"/)[1] : file;
+      return firstInclude(source.replace(`${root}/`, ""));
+    }),
+  );
+}
+
 export async function headers() {
   mkdirSync(cache, { recursive: true });
   const flags = await compileFlags({ precompiled: true });
-  const compiled = new Set([...flags.keys()].map(firstInclude));
+  const compiled = compiledAlone();
   const version = (await run("g++", ["--version"])).output;
   const complaints = [];
   const paths = await trackedFiles(/^(engine|protocol|server|tests)\/.*\.h$/);

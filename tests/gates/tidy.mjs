@@ -30,19 +30,18 @@ const checksFor = (path) => (path.startsWith("tests/") ? testChecks : sourceChec
 const cache = resolve(root, "build/checks/tidy");
 
 /**
- * The compiler's flags per source, from the release build: everything but the compiler, -o, -c, the file and, unless asked
- * for, the precompiled headers.
+ * The compiler's flags per source, as the release build has them, which compiles sources in batches: everything but the
+ * compiler, -o, -c, the file and, unless asked for, the precompiled headers.
  */
 export async function compileFlags({ precompiled = false } = {}) {
   const dropped = precompiled ? ["-c", "-o"] : ["-c", "-o", "-include", "-Winvalid-pch"];
-  const commands = resolve(root, "build/release/compile_commands.json");
-  if (!existsSync(commands)) {
-    const configured = await run("cmake", ["--preset", "release"]);
-    if (configured.status !== 0)
-      throw new Error(`the release build cannot be configured:\n${configured.output}`);
-  }
+  const apart = resolve(root, "build/checks/flags");
+  const configured = await run("cmake", ["--preset", "release", "-B", apart, "-DPOINTWRIGHT_BATCHES=OFF"]);
+  if (configured.status !== 0)
+    throw new Error(`the release build cannot be configured:\n${configured.output}`);
+  const commands = readFileSync(resolve(apart, "compile_commands.json"), "utf8");
   const flags = new Map();
-  for (const { file, command } of JSON.parse(readFileSync(commands, "utf8"))) {
+  for (const { file, command } of JSON.parse(commands.replaceAll(apart, resolve(root, "build/release")))) {
     // The commands are written for a shell: a definition's quotes come with backslashes.
     const words = command
       .split(" ")

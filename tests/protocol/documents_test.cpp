@@ -13,7 +13,7 @@ using namespace pointwright::protocol;
 namespace {
 
 std::string read_file(const std::string& path) {
-  std::ifstream in(std::string(POINTWRIGHT_SOURCE_DIR) + "/protocol/" + path, std::ios::binary);
+  std::ifstream in(std::string(POINTWRIGHT_SOURCE_DIR "/protocol/").append(path), std::ios::binary);
   REQUIRE_MESSAGE(in, path);
   return {std::istreambuf_iterator<char>(in), {}};
 }

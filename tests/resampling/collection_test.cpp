@@ -21,14 +21,6 @@ float wave_at(const Vec3f& p) {
   return 0.001F * std::sin(40.0F * p.x()) * std::cos(30.0F * p.y());
 }
 
-Region ball(const Vec3f& center, float radius) {
-  return Region(test::from_list({center}), {radius});
-}
-// t = 1 on all of the surface.
-RegionPair everything() {
-  return {.zero = ball({1e4F, 0.0F, 0.0F}, 1.0F), .one = ball(Vec3f::Zero(), 1e3F)};
-}
-
 // The middle of a plane scaled in its plane.
 test::EditScene middle_scaled(const Vec3d& factors, double collect) {
   const Level base = jittered_plane();
@@ -181,7 +173,7 @@ TEST_CASE("stretched by four and back: inserted samples go, originals stay") {
   const Level base = jittered_plane();
   const MultiresSurface surface{.levels = {base}, .detail = {}};
   const test::EditScene scene =
-      test::scene_with(surface, test::to_cloud(base.position), everything(),
+      test::scene_with(surface, test::to_cloud(base.position), test::everything(),
                        test::resampling_by(Scaling{.factors = Vec3d(4.0, 4.0, 1.0)}));
   const std::size_t n = scene.sampling->size();
   const ResampledEdit wide = test::resampled(scene);
@@ -207,7 +199,7 @@ TEST_CASE("a surface crushed to almost nothing still has sound neighbourhoods") 
   for (const double factor : {0.05, 0.001}) {
     const Level base = test::level_of(test::plane(60, kUnit, test::Sampling::kJittered));
     const test::EditScene scene =
-        test::scene_with({.levels = {base}, .detail = {}}, test::to_cloud(base.position), everything(),
+        test::scene_with({.levels = {base}, .detail = {}}, test::to_cloud(base.position), test::everything(),
                          test::resampling_by(Scaling{.factors = Vec3d::Constant(factor)}, {.collect = 0.9}));
     const ResampledEdit edit = test::resampled(scene);
     test::check_sound(edit);

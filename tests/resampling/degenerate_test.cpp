@@ -15,14 +15,9 @@ Level level_from(const Points& position) {
   for (std::size_t i = 0; i < position.size(); ++i) level.normal.set(i, Vec3f::UnitZ());
   return level;
 }
-Region ball(const Vec3f& center, float radius) {
-  return Region(test::from_list({center}), {radius});
-}
-RegionPair everything() {
-  return {.zero = ball({1e6F, 0.0F, 0.0F}, 1.0F), .one = ball(Vec3f::Zero(), 1e5F)};
-}
 RegionPair left_and_right(float gap) {
-  return {.zero = ball({-1e4F - gap, 0.0F, 0.0F}, 1e4F), .one = ball({1e4F + gap, 0.0F, 0.0F}, 1e4F)};
+  return {.zero = test::ball({-1e4F - gap, 0.0F, 0.0F}, 1e4F),
+          .one = test::ball({1e4F + gap, 0.0F, 0.0F}, 1e4F)};
 }
 
 std::vector<Deformation> awkward_deformations() {
@@ -60,31 +55,31 @@ TEST_CASE("a handful of samples can be resampled") {
     for (std::size_t i = 0; i < n; ++i)
       points.set(i, Vec3d(random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), 0.0).cast<float>());
     const Level level = level_from(test::coherent(points));
-    check_all(level, everything(), awkward_deformations());
+    check_all(level, test::everything(), awkward_deformations());
     check_all(level, left_and_right(0.5F), awkward_deformations());
   }
 }
 
 TEST_CASE("samples at one place, on a line, and in pairs") {
-  check_all(level_from(test::identical(40, {0.1F, 0.2F, 0.3F})), everything(), awkward_deformations());
+  check_all(level_from(test::identical(40, {0.1F, 0.2F, 0.3F})), test::everything(), awkward_deformations());
   check_all(level_from(test::collinear(40, {-1.0F, 0.0F, 0.0F}, {1.0F, 0.0F, 0.0F})), left_and_right(0.5F),
             awkward_deformations());
   const test::Surface plane = test::plane(20, 0.1, test::Sampling::kJittered);
   const Level pairs = test::level_of(test::joined({plane, plane}));
   check_all(pairs, left_and_right(0.5F), awkward_deformations());
-  check_all(pairs, everything(), awkward_deformations());
+  check_all(pairs, test::everything(), awkward_deformations());
 }
 
 TEST_CASE("samples without a spacing or without neighbours do not split") {
   const Level level = level_from(test::identical(40, {0.1F, 0.2F, 0.3F}));
   const test::EditScene scene =
-      test::scene_with({.levels = {level}, .detail = {}}, test::to_cloud(level.position), everything(),
+      test::scene_with({.levels = {level}, .detail = {}}, test::to_cloud(level.position), test::everything(),
                        test::resampling_by(Scaling{.factors = Vec3d::Constant(100.0)}));
   CHECK(scene.sampling->graph->k == 0);
   CHECK(test::resampled(scene).inserted == 0);
   const Level plane = test::level_of(test::plane(10, 0.1, test::Sampling::kJittered));
   test::EditScene none = test::scene_with({.levels = {plane}, .detail = {}}, test::to_cloud(plane.position),
-                                          everything(), scene.params);
+                                          test::everything(), scene.params);
   pointwright::Sampling sampling = *none.sampling;
   std::fill(sampling.spacing.begin(), sampling.spacing.end(), 0.0F);
   none.sampling = std::make_shared<const pointwright::Sampling>(std::move(sampling));
@@ -127,7 +122,7 @@ TEST_CASE("folds and enormous stretches stay finite") {
   // Scaled again and again, far beyond what squares of floats can hold.
   const std::vector<ElementaryDeformation> growth(8, Scaling{.factors = Vec3d::Constant(1000.0)});
   const test::EditScene grown =
-      test::scene_with({.levels = {plane}, .detail = {}}, test::to_cloud(plane.position), everything(),
+      test::scene_with({.levels = {plane}, .detail = {}}, test::to_cloud(plane.position), test::everything(),
                        test::resampling_by(Deformation(growth)));
   const ResampledEdit enormous = test::resampled(grown);
   test::check_sound(enormous);

@@ -56,6 +56,15 @@ inline RegionPair regions_on(const Points& position, const std::vector<float>& s
   return std::move(regions).value();
 }
 
+/// One ball.
+inline Region ball(const Vec3f& center, float radius) {
+  return Region(from_list({center}), {radius});
+}
+/// t = 1 on all of a surface, wherever edits take it.
+inline RegionPair everything() {
+  return {.zero = ball({1e6F, 0.0F, 0.0F}, 1.0F), .one = ball(Vec3f::Zero(), 1e5F)};
+}
+
 /// A scene of samples that have a graph of k neighbours and their local spacing; the regions as given.
 inline EditScene scene_with(const MultiresSurface& surface, const Cloud& cloud, const RegionPair& regions,
                             const EditParams& params, std::uint32_t k = 10) {

@@ -9,15 +9,10 @@
 namespace pointwright {
 namespace {
 
-constexpr double kUnit = 0.02;
+constexpr double kSpacing = 0.02;
 
-// t = 1 on all of the surface, wherever edits take it.
-RegionPair everything() {
-  return {.zero = Region(test::from_list({{1e4F, 0.0F, 0.0F}}), {1.0F}),
-          .one = Region(test::from_list({Vec3f::Zero()}), {1e3F})};
-}
 test::EditScene scene_of_plane(const RegionPair& regions, const EditParams& params) {
-  const Level base = test::level_of(test::plane(80, kUnit, test::Sampling::kJittered));
+  const Level base = test::level_of(test::plane(80, kSpacing, test::Sampling::kJittered));
   return test::scene_with({.levels = {base}, .detail = {}}, test::to_cloud(base.position), regions, params);
 }
 Scaling along_x(double factor) {
@@ -35,16 +30,18 @@ Points stretched_plane(double factor) {
 }
 
 TEST_CASE("eight stretches below the bound do not thin the surface") {
-  test::EditScene scene = scene_of_plane(everything(), test::resampling_by(along_x(1.3)));
+  test::EditScene scene = scene_of_plane(test::everything(), test::resampling_by(along_x(1.3)));
   const std::size_t n = scene.sampling->size();
-  const test::Holes at_rest = test::holes_of(stretched_plane(1.0), scene.surface.levels[0].position, kUnit);
+  const test::Holes at_rest =
+      test::holes_of(stretched_plane(1.0), scene.surface.levels[0].position, kSpacing);
   double factor = 1.0;
   ResampledEdit edit;
   for (int step = 0; step < 8; ++step) {
     edit = test::resampled(scene);
     test::check_sound(edit);
     factor *= 1.3;
-    const test::Holes holes = test::holes_of(stretched_plane(factor), edit.surface.levels[0].position, kUnit);
+    const test::Holes holes =
+        test::holes_of(stretched_plane(factor), edit.surface.levels[0].position, kSpacing);
     const double density = static_cast<double>(edit.sampling->size()) / (factor * static_cast<double>(n));
     MESSAGE("stretched " << factor << ": " << edit.sampling->size() << " samples, density " << density
                          << ", discs " << holes.p999 << " / " << holes.most << " (at rest " << at_rest.p999
@@ -66,7 +63,7 @@ TEST_CASE("eight stretches below the bound do not thin the surface") {
 
 TEST_CASE("edits without resampling between two with it count") {
   EditParams still = test::resampling_by(Translation{});
-  test::EditScene scene = scene_of_plane(everything(), still);
+  test::EditScene scene = scene_of_plane(test::everything(), still);
   const std::size_t n = scene.sampling->size();
   ResampledEdit edit = test::resampled(scene);
   CHECK(edit.inserted == 0);
@@ -84,20 +81,20 @@ TEST_CASE("edits without resampling between two with it count") {
   test::check_sound(edit);
   CHECK(edit.inserted == n);  // 1.3^3 = 2.2: everybody in two
   const ResampledEdit at_once =
-      test::resampled(scene_of_plane(everything(), test::resampling_by(along_x(1.3 * 1.3 * 1.3))));
+      test::resampled(scene_of_plane(test::everything(), test::resampling_by(along_x(1.3 * 1.3 * 1.3))));
   CHECK(at_once.inserted == edit.inserted);
 }
 
 TEST_CASE("a sampling that carries no cells is not touched by an edit without resampling") {
   EditParams params = test::resampling_by(along_x(1.3));
   params.resampling.reset();
-  const test::EditScene scene = scene_of_plane(everything(), params);
+  const test::EditScene scene = scene_of_plane(test::everything(), params);
   CHECK(carried_sampling(scene.sampling, scene.surface, params, scene.field) == scene.sampling);
 }
 
 // A disc around (x, 0) and a ring around it that moves; all of the other half of the plane stays.
 RegionPair beside(const Points& position, float x) {
-  return test::regions_on(position, std::vector<float>(position.size(), 0.3F * static_cast<float>(kUnit)),
+  return test::regions_on(position, std::vector<float>(position.size(), 0.3F * static_cast<float>(kSpacing)),
                           [x](const Vec3f& p) {
                             const float r = std::hypot(p.x() - x, p.y());
                             return p.x() * x < 0.0F || r > 0.35F ? 1 : r < 0.1F ? 2 : 0;
@@ -106,7 +103,7 @@ RegionPair beside(const Points& position, float x) {
 
 TEST_CASE("an edit elsewhere finds the samples as it would have found them alone") {
   const EditParams up = test::resampling_by(Translation{.vector = Vec3d(0.0, 0.0, 1.0)});
-  const Level base = test::level_of(test::plane(80, kUnit, test::Sampling::kJittered));
+  const Level base = test::level_of(test::plane(80, kSpacing, test::Sampling::kJittered));
   const test::EditScene left = scene_of_plane(beside(base.position, -0.4F), up);
   const test::EditScene right = scene_of_plane(beside(base.position, 0.4F), up);
   const ResampledEdit alone = test::resampled(right);

@@ -13,12 +13,6 @@ using namespace pointwright::test;
 
 namespace {
 
-Config lasting(const TemporaryFolder& folder) {
-  Config config;
-  config.data = folder / "data";
-  return config;
-}
-
 std::string edit(double z, const std::string& more = "") {
   return R"({"level":0,"deformation":{"type":"translation","vector":[0,0,)" + std::to_string(z) + "]}" +
          more + "}";

@@ -200,7 +200,7 @@ TEST_CASE("quotas refuse with the limit and take again what was freed") {
   test.upload(10);
   const Answer full = test.ask(Method::kPost, "/v1/clouds", "0 0 0\n", {{"content-type", "text/plain"}});
   CHECK(full.status == 429);
-  CHECK_FALSE(full.header("Retry-After").empty());
+  CHECK(full.header("Retry-After").empty());  // time does not make room
   CHECK(test.ask(Method::kDelete, session.header("Location")).status == 204);
   CHECK(test.ask(Method::kDelete, "/v1/clouds/" + first).status == 204);
   CHECK(test.ask(Method::kPost, "/v1/clouds", "0 0 0\n", {{"content-type", "text/plain"}}).status == 201);

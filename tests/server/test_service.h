@@ -17,6 +17,7 @@
 #include "server/routes/routes.h"
 #include "tests/server/stand_in_resampler.h"
 #include "tests/server/synthetic.h"
+#include "tests/server/temporary_folder.h"
 
 namespace pointwright::test {
 
@@ -40,6 +41,13 @@ struct Answer {
     return {};
   }
 };
+
+/// With a folder that outlives the service.
+inline Config lasting(const TemporaryFolder& folder) {
+  Config config;
+  config.data = folder / "data";
+  return config;
+}
 
 /// A service whose decoder runs in this process.
 struct TestService {

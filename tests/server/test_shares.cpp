@@ -2,8 +2,6 @@
 
 #include <doctest/doctest.h>
 
-#include <sqlite3.h>
-
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +11,7 @@
 #include "server/access/share_store.h"
 #include "server/base/random_id.h"
 #include "server/store/share_archive.h"
+#include "tests/server/sql.h"
 #include "tests/server/temporary_folder.h"
 #include "tests/server/test_service.h"
 
@@ -23,12 +22,6 @@ using protocol::Scope;
 using namespace std::chrono_literals;
 
 namespace {
-
-Config lasting(const TemporaryFolder& folder) {
-  Config config;
-  config.data = folder / "data";
-  return config;
-}
 
 std::string id_of(const std::string& path) {
   return path.substr(path.rfind('/') + 1);
@@ -48,18 +41,6 @@ std::size_t shares_of(TestService& service, const std::string& path) {
   const json listed = service.get(path + "/shares").body;
   REQUIRE(listed.contains("shares"));
   return listed["shares"].size();
-}
-
-/// SQL by SQLite's own hands.
-void run_sql(const std::string& path, const std::string& sql) {
-  sqlite3* database = nullptr;
-  REQUIRE(sqlite3_open(path.c_str(), &database) == SQLITE_OK);
-  char* error = nullptr;
-  const int code = sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &error);
-  const std::string told = error == nullptr ? "" : error;
-  sqlite3_free(error);
-  sqlite3_close(database);
-  REQUIRE_MESSAGE(code == SQLITE_OK, told);
 }
 
 std::string rfc3339(std::chrono::system_clock::time_point time) {

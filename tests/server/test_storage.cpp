@@ -2,7 +2,6 @@
 
 #include <doctest/doctest.h>
 
-#include <sqlite3.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -18,6 +17,7 @@
 #include "server/store/data_folder.h"
 #include "server/store/database.h"
 #include "server/store/marks_code.h"
+#include "tests/server/sql.h"
 #include "tests/server/temporary_folder.h"
 
 using namespace pointwright;
@@ -42,14 +42,6 @@ void write_text(const std::string& path, const std::string& text) {
 
 std::span<const std::byte> bytes_of(const std::string& text) {
   return std::as_bytes(std::span(text.data(), text.size()));
-}
-
-/// SQL by SQLite's own hands.
-void run_sql(const std::string& path, const std::string& sql) {
-  sqlite3* database = nullptr;
-  REQUIRE(sqlite3_open(path.c_str(), &database) == SQLITE_OK);
-  CHECK(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
-  sqlite3_close(database);
 }
 
 std::int64_t count_of(Database& database, std::string_view sql) {
@@ -297,14 +289,35 @@ TEST_CASE("a key has one answer, belongs to one request, and is busy while that 
   REQUIRE_FALSE(other.ok());
   CHECK(other.problem().kind == ProblemKind::kKeyReused);
   REQUIRE(answers.put(KeptAnswer{.key = "k2", .fingerprint = "x"}).ok());
-  const auto full = answers.claim("another caller", "k3", "request");
-  REQUIRE_FALSE(full.ok());
-  CHECK(full.problem().kind == ProblemKind::kTooMany);
-  // Who has filled it makes room of its own: the oldest go.
-  const auto own = answers.claim("", "k3", "request");
-  REQUIRE(own.ok());
-  CHECK(std::holds_alternative<Answers::Turn>(own.value()));
+  // Who has filled it makes room: the oldest go.
+  const auto newcomer = answers.claim("another caller", "k3", "request");
+  REQUIRE(newcomer.ok());
+  CHECK(std::holds_alternative<Answers::Turn>(newcomer.value()));
+  CHECK_FALSE(answers.claim("", "k2", "another request").ok());
   const auto forgotten = answers.claim("", "k1", "another request");
   REQUIRE(forgotten.ok());
   CHECK(std::holds_alternative<Answers::Turn>(forgotten.value()));
+}
+
+TEST_CASE("callers that fill the table of answers together keep nobody out") {
+  constexpr std::uint64_t kMost = 320;
+  constexpr int kEach = 20;  // a sixteenth
+  Database database("");
+  Answers answers(database, kMost);
+  const auto ask = [&](const std::string& caller, int key) {
+    auto claim = answers.claim(caller, std::to_string(key), "request");
+    REQUIRE(claim.ok());
+    const bool is_new = std::holds_alternative<Answers::Turn>(claim.value());
+    if (is_new) {
+      REQUIRE(answers.put({.caller = caller, .key = std::to_string(key), .fingerprint = "request"}).ok());
+    }
+    return is_new;
+  };
+  for (int guest = 0; guest < 16; ++guest)
+    for (int key = 0; key < kEach; ++key) CHECK(ask("token/" + std::to_string(guest), key));
+  for (int key = 0; key < kEach / 2; ++key) CHECK(ask("somebody else", key));
+  // Whoever has fewest has lost nothing, and nobody everything.
+  for (int key = 0; key < kEach / 2; ++key) CHECK_FALSE(ask("somebody else", key));
+  for (int guest = 0; guest < 16; ++guest) CHECK_FALSE(ask("token/" + std::to_string(guest), kEach - 1));
+  CHECK(count_of(database, "SELECT count(*) FROM answers") <= static_cast<std::int64_t>(kMost));
 }

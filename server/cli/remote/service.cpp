@@ -21,10 +21,6 @@ bool changes_once_more(const HttpRequest& request) {
          (request.method == "DELETE" && request.path.find("/edits/") != std::string::npos);
 }
 
-bool is_overloaded(const HttpAnswer& answer) {
-  return answer.status == 429 || answer.status == 503;
-}
-
 std::string text_of(const json& document, const char* member) {
   const auto found = document.find(member);
   return found != document.end() && found->is_string() ? found->get<std::string>() : std::string();
@@ -56,6 +52,14 @@ ExitCode exit_code_of(int status) {
 }
 
 }  // namespace
+
+bool is_overloaded(const HttpAnswer& answer) {
+  if (answer.status != 429) return answer.status == 503;
+  if (!answer.header("retry-after").empty()) return true;
+  // Where time lifts it, the server says when to come again; proxies need not.
+  const json problem = json::parse(answer.body, nullptr, false);
+  return !problem.is_object() || !text_of(problem, "type").ends_with("/too-many");
+}
 
 CommandFailure failure_of(const HttpAnswer& answer, const HttpClient& http) {
   if (answer.status == 0)

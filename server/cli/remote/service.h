@@ -40,8 +40,8 @@ class RemoteService {
   [[nodiscard]] const HttpClient& http() const { return http_; }
   [[nodiscard]] const Retries& retries() const { return retries_; }
 
-  /// An answer of success. Throws CommandFailure. 429 and 503 are asked again after the server's pause,
-  /// broken connections after a growing one; a POST whose answer was lost only where the server knows
+  /// An answer of success. Throws CommandFailure. What is_overloaded() is asked again after the server's
+  /// pause, broken connections after a growing one; a POST whose answer was lost only where the server knows
   /// idempotency keys.
   [[nodiscard]] HttpAnswer ask(HttpRequest request) const;
   /// The same, with a JSON body.
@@ -60,6 +60,8 @@ class RemoteService {
   Retries retries_;
 };
 
+/// Whether the same request may succeed after a pause: 503, and 429 that time lifts.
+bool is_overloaded(const HttpAnswer& answer);
 /// What a refusal says, for a person, and how the command ends. Of an answer of 400 or more, or of none.
 CommandFailure failure_of(const HttpAnswer& answer, const HttpClient& http);
 /// The document of an answer; throws CommandFailure where it is none.

@@ -133,8 +133,7 @@ class ResumableUpload {
       // 409: another offset than the server's; 423: the part before is still being taken; 460: the part was
       // damaged on its way.
       const bool again = (answer.status == 0 && !answer.is_untrusted) || answer.status == 409 ||
-                         answer.status == 423 || answer.status == 429 || answer.status == 460 ||
-                         answer.status == 503;
+                         answer.status == 423 || answer.status == 460 || is_overloaded(answer);
       if (!again || failures >= service_.retries().count)
         throw left_behind(failure_of(answer, service_.http()));
       service_.pause(failures++, answer.header("retry-after"));
@@ -224,8 +223,7 @@ class ResumableUpload {
       if (answer.status == 404 || answer.status == 410) return std::nullopt;
       const auto offset = number_in(answer.header("upload-offset"));
       if (answer.status >= 200 && answer.status < 300 && offset && *offset <= source_.size) return offset;
-      const bool again =
-          (answer.status == 0 && !answer.is_untrusted) || answer.status == 429 || answer.status == 503;
+      const bool again = (answer.status == 0 && !answer.is_untrusted) || is_overloaded(answer);
       if (!again || attempt >= service_.retries().count)
         throw left_behind(failure_of(answer, service_.http()));
       service_.pause(attempt, answer.header("retry-after"));

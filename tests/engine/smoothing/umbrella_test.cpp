@@ -230,7 +230,7 @@ TEST_CASE("parameters out of range are refused and named") {
 }
 
 TEST_CASE("the greatest lambda itself is allowed") {
-  CHECK(validate({.lambda = 0.7F}).ok());
+  CHECK(validate(UmbrellaParams{.lambda = 0.7F}).ok());
 }
 
 TEST_CASE("missing normals or a graph of other points are logic errors") {

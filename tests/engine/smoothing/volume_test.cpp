@@ -260,8 +260,8 @@ TEST_CASE("pass bands out of range and diverging pairs of steps are refused") {
   CHECK(field_of({.pass_band = 0.21F}) == "pass_band");
   CHECK(field_of({.pass_band = std::nanf("")}) == "pass_band");
   CHECK(field_of({.preserve = VolumePreservation::kTaubin, .lambda = 0.7F}) == "lambda");
-  CHECK(validate({.preserve = VolumePreservation::kTaubin, .lambda = 0.65F}).ok());
-  CHECK(validate({.preserve = VolumePreservation::kLocal, .lambda = 0.7F}).ok());
+  CHECK(validate(UmbrellaParams{.preserve = VolumePreservation::kTaubin, .lambda = 0.65F}).ok());
+  CHECK(validate(UmbrellaParams{.preserve = VolumePreservation::kLocal, .lambda = 0.7F}).ok());
 }
 
 TEST_CASE("every control of shrinkage gives the same bytes for any thread count") {

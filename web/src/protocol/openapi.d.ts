@@ -301,7 +301,10 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** All imports that are under way or have ended lately */
+        /**
+         * All imports that are under way or have ended lately
+         * @description Imports end with the server's process, and nothing of one that had not ended is kept: after a restart its id is unknown. The resumable upload that it reads is still there then, and can be imported again.
+         */
         get: operations["listImports"];
         put?: never;
         post?: never;
@@ -1025,6 +1028,8 @@ export interface components {
             requests_per_second?: components["schemas"]["Count"];
             /** @description That wait or run */
             jobs?: components["schemas"]["Count"];
+            clouds?: components["schemas"]["Count"];
+            images?: components["schemas"]["Count"];
         };
         TokenRequest: {
             name: components["schemas"]["Name"];
@@ -1945,7 +1950,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description Refused for now */
+        /** @description Refused for now. 429 without `Retry-After`: time lifts nothing, something must be deleted first. */
         Busy: {
             headers: {
                 "X-Request-Id": components["headers"]["RequestId"];
