@@ -131,7 +131,7 @@ TEST_CASE(
   struct stat info {};
   REQUIRE(::stat(path.c_str(), &info) == 0);
   CHECK((info.st_mode & 0777U) == 0600U);
-  run_sql(path, "PRAGMA user_version=99");
+  test::run_sql(path, "PRAGMA user_version=99");
   CHECK_THROWS_WITH_AS(Database{path}, doctest::Contains("newer version"), std::runtime_error);
   write_text(temporary / "text.db", std::string(5000, 'x'));
   CHECK_THROWS_AS(Database{temporary / "text.db"}, std::runtime_error);

@@ -199,8 +199,14 @@ test("jobs are followed live, dismissed, started again, and a failure says why",
 
   await row.getByRole("button", { name: "Start again: Held" }).click();
   await rowWith(dialog, "Held", "Running");
+  // A proxy's page in the place of the list.
+  const notThere = { status: 200, contentType: "text/html", body: "<p>Back soon" };
+  await page.route(`**/v1/jobs/${held.jobID}/results`, (route) => route.fulfill(notThere), { times: 1 });
   writeFileSync(gate, "go");
   await rowWith(dialog, "Held", "Finished");
+  await row.getByText("The results cannot be listed").waitFor();
+  assert.equal(await row.getByRole("link", { name: /^Download/ }).count(), 0);
+  await row.getByRole("button", { name: "List the results of Held again" }).click();
   await row.getByText(/dismissed[\s\S]*attempt [\s\S]*successful/).waitFor();
   await row.getByRole("link", { name: /^Download PLY .*, Held\.ply$/ }).waitFor();
 

@@ -144,16 +144,34 @@ export function createJobRow(
     );
     return link;
   };
-  let listed = false;
+  let isAsked = false;
   const listResults = async (): Promise<void> => {
-    if (listed) return;
-    listed = true;
+    if (isAsked) return;
+    isAsked = true;
+    // Not with each news of the job: whoever reads why asks again.
+    const again = h(
+      "button",
+      {
+        type: "button",
+        class: "button",
+        aria: { label: `List the results of ${name} again` },
+        onclick: () => {
+          isAsked = false;
+          void listResults();
+        },
+      },
+      "List results",
+    );
+    replaceChildren(downloads, again);
+    again.hidden = true;
     await guarded("The results cannot be listed", async () => {
       const { results } = await client.jobResults(job.jobID);
       const isAnimation = results.length > 1;
       frames.hidden = !isAnimation;
+      replaceChildren(downloads);
       replaceChildren(isAnimation ? frames : downloads, ...results.map(download));
     });
+    again.hidden = false;
   };
 
   const element = h(
