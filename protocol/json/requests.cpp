@@ -363,8 +363,8 @@ bool is_valid_region_name(std::string_view name) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
            c == ' ' || c == '.' || c == '-';
   };
-  return !name.empty() && name.size() <= kMaxBytes && name.front() != ' ' && name.back() != ' ' &&
-         std::ranges::all_of(name, allowed) && std::ranges::find(kReserved, name) == kReserved.end();
+  return !name.empty() && name.size() <= kMaxBytes && std::ranges::all_of(name, allowed) &&
+         std::ranges::find(kReserved, name) == kReserved.end();
 }
 
 std::string pointer_of_field(std::string_view field) {

@@ -85,8 +85,8 @@ JsonDocument to_json(const EditParams& edit);
 std::string_view blend_name(Blend blend);         ///< "quartic"
 std::string_view region_name(RegionKind region);  ///< "zero", "one"
 std::optional<RegionKind> region_of_name(std::string_view name);
-/// Names of regions besides zero and one: 1 to 64 of A-Z, a-z, 0-9, _, dot, dash and, between others,
-/// space; not "zero", "one", "t", "." and "..".
+/// Names of regions besides zero and one: 1 to 64 of A-Z, a-z, 0-9, _, space, dot and dash; not "zero",
+/// "one", "t", "." and "..".
 bool is_valid_region_name(std::string_view name);
 
 /// Where in a request document the field of an engine error stands: "deformation.axis" of an edit is

@@ -183,7 +183,8 @@ Outcome<QuotaHold> Access::hold_part(const Caller& caller, Quota quota, std::uin
                   .limit = static_cast<double>(limit),
                   .actual = static_cast<double>(accounts_.held(account, quota) + amount)};
   // Streams and jobs end by themselves; what else is held stays until it is deleted.
-  if (quota == Quota::kStreams || quota == Quota::kJobs) problem.retry_after = protocol::kPassingSeconds;
+  const bool is_passing = quota == Quota::kStreams || quota == Quota::kJobs;
+  if (is_passing && amount <= limit) problem.retry_after = protocol::kPassingSeconds;
   return problem;
 }
 

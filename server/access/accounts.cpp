@@ -16,6 +16,7 @@ QuotaHold Accounts::hold(const std::string& owner, Quota quota, std::uint64_t am
   return {book_.get(), [book = book_, owner, index, amount](const void*) {
             const std::lock_guard lock(book->mutex);
             const auto it = book->held.find(owner);
+            if (it == book->held.end()) return;  // of nothing
             it->second[index] -= amount;
             const auto& left = it->second;
             if (std::all_of(left.begin(), left.end(), [](std::uint64_t n) { return n == 0; }))

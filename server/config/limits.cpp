@@ -43,7 +43,7 @@ constexpr std::array kTable = {
     LimitInfo{"max_named_regions", &Limits::max_named_regions, 0, 1'000,
               "regions of one session besides zero and one; each takes a byte a sample"},
     LimitInfo{"max_kept_answers", &Limits::max_kept_answers, 1, 100'000'000,
-              "answers to requests with an Idempotency-Key that are remembered, each for a day"},
+              "answers to requests with an Idempotency-Key that are remembered, each for a day at most"},
     LimitInfo{"session_idle_expiry_s", &Limits::session_idle_expiry_s, 0, 1'000'000'000,
               "time after which a session that nobody asks for is deleted, seconds; 0: never"},
     LimitInfo{"wake_wait_ms", &Limits::wake_wait_ms, 0, 600'000,

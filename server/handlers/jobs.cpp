@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -212,12 +213,14 @@ Response file_response(const Request& request, const std::string& path, const pr
     return problem_response(
         {.kind = ProblemKind::kInternalError, .detail = "the result cannot be read from the disk"}, request);
   Response response{.content_type = result.media_type};
-  response.body = [file](BodySink& sink) {
+  response.body = [file, due = static_cast<off_t>(result.bytes)](BodySink& sink) {
     std::vector<std::byte> piece(kFilePiece);
-    for (off_t at = 0; !sink.is_peer_gone();) {
-      const ssize_t count = ::pread(file->get(), piece.data(), piece.size(), at);
+    for (off_t at = 0; at < due && !sink.is_peer_gone();) {
+      const auto wanted = static_cast<std::size_t>(std::min<off_t>(due - at, off_t{kFilePiece}));
+      const ssize_t count = ::pread(file->get(), piece.data(), wanted, at);
       if (count < 0 && errno == EINTR) continue;
-      if (count <= 0 || !sink.write(std::span(piece).first(static_cast<std::size_t>(count)))) return;
+      if (count <= 0) throw std::runtime_error("a result is shorter than it was, or cannot be read");
+      if (!sink.write(std::span(piece).first(static_cast<std::size_t>(count)))) return;
       at += count;
     }
   };

@@ -179,19 +179,23 @@ void fill(httplib::Response& out, Response response, Exchange& exchange) {
     exchange.begin_stream_write();
     out.set_chunked_content_provider(response.content_type,
                                      [body = std::move(*stream), &exchange](size_t, httplib::DataSink& sink) {
-                                       // An exception that left a provider would end the process.
+                                       // An exception that left a provider would end the process. What
+                                       // it cuts off must not look whole: the connection breaks.
+                                       bool is_whole = false;
                                        try {
                                          const RequestScope scope(exchange.request_id());
                                          ChunkSink target(exchange);
                                          body(target);
+                                         is_whole = true;
                                        } catch (const std::exception& error) {
                                          exchange.note_failure(error.what());
                                        } catch (...) {
                                          exchange.note_failure("an unknown exception");
                                        }
                                        exchange.begin_stream_write();
-                                       if (!exchange.is_broken()) sink.done();
-                                       return !exchange.is_broken();
+                                       is_whole = is_whole && !exchange.is_broken();
+                                       if (is_whole) sink.done();
+                                       return is_whole;
                                      });
   } else {
     exchange.begin_answer(0);

@@ -13,8 +13,6 @@ using protocol::Problem;
 using protocol::ProblemKind;
 using SteadyClock = std::chrono::steady_clock;
 
-namespace {}  // namespace
-
 template <typename T>
 Outcome<Done> Session::keep(const Document& before, const Document& after, const Seal<T>& seal,
                             const T& result) {

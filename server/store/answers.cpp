@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <string>
+#include <vector>
 
 #include "protocol/json/documents.h"
 #include "server/store/row_time.h"
@@ -32,24 +34,48 @@ std::int64_t count_all(Database::Access& access) {
   return count.integer(0);
 }
 
-/// Who has most of them loses the oldest ones, until there are `goal` of them. Cost: O(N log N), few times
-void shrink_to(Database::Access& access, std::int64_t goal) {
-  for (std::int64_t total = count_all(access); total > goal; total = count_all(access)) {
-    std::string caller;
-    std::int64_t most = 0;
-    std::int64_t next = 0;
-    {
-      Statement callers =
-          access.query("SELECT caller, count(*) FROM answers GROUP BY caller ORDER BY 2 DESC, 1 LIMIT 2");
-      if (!callers.step()) return;
-      caller = callers.text(0);
-      most = callers.integer(1);
-      if (callers.step()) next = callers.integer(1);
-    }
-    // Down to the next one's number; of equals each gives a part.
-    const std::int64_t part = (total - goal) / static_cast<std::int64_t>(kCallers);
-    forget_oldest(access, caller, std::clamp<std::int64_t>(std::max(most - next, part), 1, total - goal));
+/// Callers are a token's id and, of a share link, its session's: guests count with who shared it.
+constexpr int kIdLength = 22;
+
+/// As many as each may keep, so that all keep `goal` at most; 0 where there are more callers than that.
+std::int64_t level_of(std::vector<std::int64_t> counts, std::int64_t goal) {
+  std::sort(counts.begin(), counts.end());
+  auto left = static_cast<std::int64_t>(counts.size());
+  for (const std::int64_t count : counts) {
+    if (count * left > goal) return goal / left;
+    goal -= count;
+    --left;
   }
+  return counts.empty() ? 0 : counts.back();
+}
+
+/// Whoever has most of them loses the oldest ones, until no more than `goal` are left.
+/// Cost: O(N log N)
+void shrink_to(Database::Access& access, std::int64_t goal) {
+  std::vector<std::string> owners;
+  std::vector<std::int64_t> counts;
+  {
+    Statement row =
+        access.query("SELECT substr(caller, 1, ?) AS owner, count(*) FROM answers GROUP BY owner", kIdLength);
+    while (row.step()) {
+      owners.push_back(row.text(0));
+      counts.push_back(row.integer(1));
+    }
+  }
+  const std::int64_t level = level_of(counts, goal);
+  for (std::size_t i = 0; level > 0 && i < owners.size(); ++i) {
+    if (counts[i] <= level) continue;
+    access.run(
+        "DELETE FROM answers WHERE (caller, key) IN (SELECT caller, key FROM answers "
+        "WHERE substr(caller, 1, ?) = ? ORDER BY created LIMIT ?)",
+        kIdLength, owners[i], counts[i] - level);
+  }
+  // More owners than room: of them, too, who came first.
+  if (const std::int64_t over = count_all(access) - goal; over > 0)
+    access.run(
+        "DELETE FROM answers WHERE (caller, key) IN "
+        "(SELECT caller, key FROM answers ORDER BY created LIMIT ?)",
+        over);
 }
 
 }  // namespace

@@ -60,11 +60,12 @@ Outcome<ImportDocument> ImportStore::start(NewImport import, Work work) {
       return each->owner == entry->owner && !has_ended(each->document);
     });
     if (!entry->owner.empty() && static_cast<std::uint64_t>(under_way) >= token_imports_)
-      return Problem{.kind = ProblemKind::kTooMany,
-                     .detail = "as many imports of the token are under way as may be (token_imports)",
-                     .limit = static_cast<double>(token_imports_),
-                     .actual = static_cast<double>(under_way + 1),
-                     .retry_after = protocol::kPassingSeconds};
+      return Problem{
+          .kind = ProblemKind::kTooMany,
+          .detail = "as many imports of the token are under way as may be (token_imports)",
+          .limit = static_cast<double>(token_imports_),
+          .actual = static_cast<double>(under_way + 1),
+          .retry_after = token_imports_ > 0 ? std::optional(protocol::kPassingSeconds) : std::nullopt};
     if (entries_.size() >= max_imports_) {
       const auto ended = displaced(
           entries_, [](const Entry& each) { return each.owner; },

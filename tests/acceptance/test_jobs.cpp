@@ -13,6 +13,7 @@
 
 #include "tests/acceptance/bodies.h"
 #include "tests/acceptance/daemon.h"
+#include "tests/server/raw_client.h"
 
 using namespace pointwright;
 using namespace pointwright::test;
@@ -173,8 +174,16 @@ TEST_CASE("a session's edits are made on the whole of its cloud, with the report
   CHECK(daemon.get("/v1/jobs?status=failed").json()["jobs"].empty());
   CHECK(daemon.get("/v1/jobs?status=done").status == 422);
   CHECK(daemon.ask("POST", path_of(job) + "/restart").status == 409);
-  // What the disk has lost is told, not sent as nothing.
-  std::filesystem::remove((folder / "data/jobs/") + job["jobID"].get<std::string>() + "/result.ply");
+  // What the disk has lost is told, not sent as nothing, nor a part of it as the whole.
+  const std::string kept = (folder / "data/jobs/") + job["jobID"].get<std::string>() + "/result.ply";
+  const std::string request =
+      "GET " + result["href"].get<std::string>() + " HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  CHECK(exchange(daemon.port(), request).ends_with("\r\n0\r\n\r\n"));
+  std::filesystem::resize_file(kept, 1000);
+  const std::string part = exchange(daemon.port(), request);
+  CHECK(part.starts_with("HTTP/1.1 200"));
+  CHECK_FALSE(part.ends_with("\r\n0\r\n\r\n"));
+  std::filesystem::remove(kept);
   CHECK(daemon.get(result["href"]).status == 500);
 
   CHECK(daemon.ask("DELETE", path_of(job)).status == 200);

@@ -210,9 +210,8 @@ TEST_CASE("what regions under names are refused for") {
   const auto status = [&](const std::string& region, const std::string& operation) {
     return daemon.ask("POST", session + "/regions/" + region + "/operations", operation).status;
   };
-  for (const std::string& name :
-       {std::string("t"), std::string("a%2Fb"), std::string("%C3%B6"), std::string(65, 'x'),
-        std::string("a%0A"), std::string("%20a"), std::string("a%20")})
+  for (const std::string& name : {std::string("t"), std::string("a%2Fb"), std::string("%C3%B6"),
+                                  std::string(65, 'x'), std::string("a%0A")})
     CHECK(daemon.ask("PUT", session + "/regions/" + name, list_of(kBall)).status >= 400);
   const auto pointer = [&](const std::string& region, const std::string& operation) {
     const Reply reply = daemon.ask("POST", session + "/regions/" + region + "/operations", operation);
@@ -221,7 +220,6 @@ TEST_CASE("what regions under names are refused for") {
   };
   CHECK(pointer("one", use("nobody")) == "/shape/region");
   CHECK(pointer("one", use("a/b")) == "/shape/region");
-  CHECK(pointer("one", use("a ")) == "/shape/region");
   CHECK(pointer("a", R"({"mode":"add","steal":true,"shape":{"type":"all"}})") == "/steal");
   CHECK(pointer("a", R"({"mode":"flood","seed":[0,0,0],"stop_at_other":true})") == "/stop_at_other");
   const Reply listed = daemon.ask("PUT", session + "/regions/zero", list_of(kLeft + "," + use("nobody")));

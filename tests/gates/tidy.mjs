@@ -40,8 +40,10 @@ export async function compileFlags({ precompiled = false } = {}) {
   if (configured.status !== 0)
     throw new Error(`the release build cannot be configured:\n${configured.output}`);
   const commands = readFileSync(resolve(apart, "compile_commands.json"), "utf8");
+  const release = resolve(root, "build/release");
+  if (precompiled && !existsSync(resolve(release, "build.ninja"))) await run("cmake", ["--preset", "release"]);
   const flags = new Map();
-  for (const { file, command } of JSON.parse(commands.replaceAll(apart, resolve(root, "build/release")))) {
+  for (const { file, command } of JSON.parse(commands.replaceAll(apart, release))) {
     // The commands are written for a shell: a definition's quotes come with backslashes.
     const words = command
       .split(" ")

@@ -321,3 +321,25 @@ TEST_CASE("callers that fill the table of answers together keep nobody out") {
   for (int guest = 0; guest < 16; ++guest) CHECK_FALSE(ask("token/" + std::to_string(guest), kEach - 1));
   CHECK(count_of(database, "SELECT count(*) FROM answers") <= static_cast<std::int64_t>(kMost));
 }
+
+TEST_CASE("guests of one token push none of another's answers out, however many they are") {
+  constexpr std::uint64_t kMost = 64;
+  Database database("");
+  Answers answers(database, kMost);
+  const auto answer = [&](const std::string& caller, int key) {
+    const auto claim = answers.claim(caller, std::to_string(key), "request");
+    REQUIRE(claim.ok());
+    if (!std::holds_alternative<Answers::Turn>(claim.value())) return false;
+    REQUIRE(answers.put({.caller = caller, .key = std::to_string(key), .fingerprint = "request"}).ok());
+    return true;
+  };
+  const std::string token(22, 'a');
+  for (int key = 0; key < 4; ++key) answer(std::string(22, 'b'), key);
+  for (int guest = 0; guest < 200; ++guest) answer(token + std::to_string(guest), 0);
+  for (int key = 0; key < 4; ++key) CHECK_FALSE(answer(std::string(22, 'b'), key));
+  CHECK_FALSE(answer(token + "199", 0));
+  // So many callers that not each keeps one: who came last does.
+  for (int other = 0; other < 200; ++other) answer(std::to_string(other), 0);
+  CHECK_FALSE(answer("199", 0));
+  CHECK(count_of(database, "SELECT count(*) FROM answers") <= static_cast<std::int64_t>(kMost));
+}

@@ -18,6 +18,13 @@ export class ApiError extends Error {
   }
 }
 
+/** Whether the same request may succeed later: the connection broke, or the server or a proxy before it says so. */
+export function isPassing(error: unknown): error is ApiError {
+  if (!(error instanceof ApiError)) return false;
+  if (error.status === 429) return error.retryAfter !== undefined;
+  return error.status === 0 || error.status === 423 || error.status >= 500;
+}
+
 /** The problem that a refused answer tells; what is not a problem document becomes one by its status. */
 export function problemFromBody(status: number, statusText: string, text: string): Problem {
   try {

@@ -1,6 +1,6 @@
 import type { ApiClient } from "./client";
-import { ApiError, networkProblem } from "./problem";
-import type { CloudDocument } from "./types";
+import { ApiError, isPassing, networkProblem } from "./problem";
+import type { CloudDocument, ImportDocument } from "./types";
 import type { UploadOptions } from "./upload";
 
 /** What one request carries: little to send again where the connection breaks. */
@@ -25,9 +25,10 @@ function base64(text: string): string {
   return btoa(String.fromCharCode(...new TextEncoder().encode(text)));
 }
 
-/** Whether trying again may help: the connection broke, the server is busy, or another request has the upload. */
-function isPassing(error: unknown): boolean {
-  return error instanceof ApiError && (error.status === 0 || error.status === 423 || error.status >= 500);
+/** Milliseconds: ever more, and no less than the server asks for. */
+function pauseBefore(tries: number, error: unknown): number {
+  const asked = error instanceof ApiError ? (error.retryAfter ?? 0) : 0;
+  return Math.max(Math.min(250 * 2 ** tries, 10_000), 1000 * Math.min(asked, 60));
 }
 
 /** Sends a file in pieces that outlive the connection (tus 1.0.0), from where the last try ended; then imports it. */
@@ -93,7 +94,7 @@ export async function uploadInPieces(
       }
       tries += 1;
       if (!(isPassing(error) || status === 409) || tries > MOST_TRIES) throw error;
-      await pause(Math.min(250 * 2 ** tries, 10_000));
+      await pause(pauseBefore(tries, error));
     }
   }
   options.onProgress?.(1);
@@ -117,7 +118,19 @@ async function importAsked(
   pause: (ms: number) => Promise<void>,
 ): Promise<CloudDocument> {
   const nonfinite = options.dropNonFinite ? "drop" : "reject";
-  let asked = await client.importUpload({ upload, name, nonfinite });
+  const begun = async (): Promise<ImportDocument> => {
+    for (let tries = 1; ; ++tries) {
+      try {
+        return await client.importUpload({ upload, name, nonfinite });
+      } catch (error) {
+        // A request whose answer was lost may have begun it; a refused one has not.
+        const isRefused = error instanceof ApiError && (error.status === 429 || error.status === 503);
+        if (!(isRefused && isPassing(error)) || tries > MOST_TRIES || options.signal?.aborted) throw error;
+        await pause(pauseBefore(tries, error));
+      }
+    }
+  };
+  let asked = await begun();
   let wait = 100;
   let failures = 0;
   for (;;) {
@@ -140,6 +153,7 @@ async function importAsked(
     } catch (error) {
       failures += 1;
       if (!isPassing(error) || failures > MOST_TRIES) throw error;
+      await pause(pauseBefore(failures, error));
     }
   }
 }

@@ -1,5 +1,5 @@
 import type { ApiClient } from "../api/client";
-import { describeProblem, problemOf } from "../api/problem";
+import { describeProblem, isPassing, problemOf } from "../api/problem";
 import { h } from "./dom";
 
 const POLL_MS = 1000;
@@ -61,7 +61,7 @@ export class JobLog {
         if (signal.aborted) return;
         const problem = problemOf(error);
         this.add(`\n(${[problem.title, ...describeProblem(problem)].join(": ")})\n`);
-        if (problem.status !== 0 || isLast) return;
+        if (!isPassing(error) || isLast) return;
       }
       await new Promise((resolve) => setTimeout(resolve, POLL_MS));
     }

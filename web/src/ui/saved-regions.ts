@@ -6,12 +6,12 @@ import { selectField, textField } from "./fields";
 import { formatCount } from "./format";
 import { icon } from "./icons";
 
-const NAME = /^(?! )[A-Za-z0-9_ .-]{1,64}(?<! )$/;
+const NAME = /^[A-Za-z0-9_ .-]{1,64}$/;
 const RESERVED = ["zero", "one", "t", ".", ".."];
 
 /** Why a region cannot be called so; empty where it can. */
 export function nameFault(name: string): string {
-  if (!NAME.test(name))
+  if (!NAME.test(name) || name.trim() !== name)
     return "A name has 1 to 64 letters, digits, spaces, dots, dashes or underscores, and no outer spaces.";
   return RESERVED.includes(name) ? `“${name}” means something else here.` : "";
 }

@@ -54,7 +54,7 @@ function stand(breaks: number[] = [], states: unknown[] = [{ state: "successful"
     if (init.method === "DELETE") return new Response(null, { status: 204 });
     return new Response(null, { headers: { "Upload-Offset": String(offset) } });
   };
-  return { client: new ApiClient("http://host/", fetch), log, at: () => offset };
+  return { client: new ApiClient("http://host/", fetch), fetch, log, at: () => offset };
 }
 
 function memory(): Storage & { all: Map<string, string> } {
@@ -95,6 +95,38 @@ describe("an upload in pieces", () => {
     await uploadInPieces(client, file(), { memory: memory(), pause, dropNonFinite: true });
     expect(log).toContain(`HEAD v1/uploads/${ID}`);
     expect(log).toContain(`PATCH v1/uploads/${ID} ${1.5 * PIECE}`);
+  });
+
+  it("waits where the server says when to come again, and gives up where time lifts nothing", async () => {
+    const refusing = (refused: string, headers: Record<string, string>) => {
+      const server = stand();
+      let left = 2;
+      const client = new ApiClient("http://host/", async (url, init = {}) => {
+        if (`${init.method} ${url}`.startsWith(refused) && left-- > 0)
+          return new Response('{"title":"Too many","status":429}', { status: 429, headers });
+        return await server.fetch(String(url), init);
+      });
+      return { ...server, client };
+    };
+    for (const refused of [
+      "POST http://host/v1/uploads",
+      "PATCH http://host/",
+      "POST http://host/v1/clouds",
+    ]) {
+      const waits: number[] = [];
+      const options = {
+        memory: memory(),
+        dropNonFinite: true,
+        pause: async (ms: number) => void waits.push(ms),
+      };
+      const passing = refusing(refused, { "Retry-After": "7" });
+      expect(await uploadInPieces(passing.client, file(), options)).toEqual({ id: "cloud" });
+      expect(waits.filter((ms) => ms === 7000).length).toBe(2);
+      expect(passing.log.filter((line) => line === "POST v1/clouds").length).toBe(1);
+      const full = refusing(refused, {});
+      await expect(uploadInPieces(full.client, file(), options)).rejects.toThrow("Too many");
+      expect(full.log).not.toContain("POST v1/clouds");
+    }
   });
 
   it("goes on after a reload, and starts anew where the upload is gone", async () => {
