@@ -41,7 +41,8 @@ export async function compileFlags({ precompiled = false } = {}) {
     throw new Error(`the release build cannot be configured:\n${configured.output}`);
   const commands = readFileSync(resolve(apart, "compile_commands.json"), "utf8");
   const release = resolve(root, "build/release");
-  if (precompiled && !existsSync(resolve(release, "build.ninja"))) await run("cmake", ["--preset", "release"]);
+  if (precompiled && !existsSync(resolve(release, "build.ninja")))
+    await run("cmake", ["--preset", "release"]);
   const flags = new Map();
   for (const { file, command } of JSON.parse(commands.replaceAll(apart, release))) {
     // The commands are written for a shell: a definition's quotes come with backslashes.
