@@ -10,7 +10,7 @@
 namespace pointwright {
 namespace {
 
-constexpr std::size_t kContractionsPerLook = 4096;  // contractions
+constexpr std::size_t kContractionsPerLook = 4096;  // whether it was cancelled
 
 class Greedy {
  public:

@@ -413,7 +413,6 @@ bool is_valid_name(std::string_view name) {
 }
 
 bool is_valid_id(std::string_view id) {
-  constexpr std::size_t kIdLength = 22;
   const auto allowed = [](char c) {
     return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
   };

@@ -1,6 +1,7 @@
 #pragma once
 // What clients send: JSON documents to engine values, checked in full, and back.
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -95,6 +96,8 @@ std::string pointer_of_field(std::string_view field);
 
 /// Names of clouds and sessions: 1 to 120 bytes of UTF-8 without control characters.
 bool is_valid_name(std::string_view name);
+/// Characters of an id.
+inline constexpr std::size_t kIdLength = 22;
 /// Ids of clouds and sessions: [A-Za-z0-9_-]{22}.
 bool is_valid_id(std::string_view id);
 

@@ -23,8 +23,8 @@
 namespace pointwright::server {
 namespace {
 
-constexpr std::uint64_t kSortedTogether = std::uint64_t{1} << 21U;  // samples that are sorted together
-constexpr std::size_t kSortedTogethersAtOnce = 2;
+constexpr std::uint64_t kChunkSamples = std::uint64_t{1} << 21U;  // that are sorted together
+constexpr std::size_t kChunksAtOnce = 2;
 constexpr std::uint64_t kIndexMagic = 0x32584449'54575054ULL;
 constexpr std::uint64_t kResultMagic = 0x31534552'54575054ULL;
 constexpr std::size_t kProbes = 64;  // blocks of samples whose neighbourhoods say how wide a ring is
@@ -170,7 +170,7 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
   std::atomic<int> failure{spool.is_open() ? 0 : errno};
   const std::byte* const first = file.bytes().data() + records.begin;
   // Every chunk has its place in the spool, so they may be sorted and written side by side.
-  const auto chunks = static_cast<std::size_t>((records.count + kSortedTogether - 1) / kSortedTogether);
+  const auto chunks = static_cast<std::size_t>((records.count + kChunkSamples - 1) / kChunkSamples);
   std::vector<std::vector<std::pair<std::uint32_t, Extent>>> extents(chunks);
   std::atomic<std::size_t> next{0};
   const auto sort_chunks = [&] {
@@ -180,8 +180,8 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
     for (std::size_t chunk = next++; chunk < chunks; chunk = next++) {
       if (!team.takes(chunk)) continue;
       if (context.is_cancelled() || failure != 0) return;
-      const std::uint64_t begin = chunk * kSortedTogether;
-      const auto count = static_cast<std::size_t>(std::min(kSortedTogether, records.count - begin));
+      const std::uint64_t begin = chunk * kChunkSamples;
+      const auto count = static_cast<std::size_t>(std::min(kChunkSamples, records.count - begin));
       const auto place_of_record = [&](const std::byte* record) {
         // At origin 0 the cast alone keeps a negative zero.
         const Vec3d p = records.position(record);
@@ -215,7 +215,7 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
     }
   };
   parallel_for(
-      kSortedTogethersAtOnce, [&](std::size_t, std::size_t) { sort_chunks(); }, 1);
+      kChunksAtOnce, [&](std::size_t, std::size_t) { sort_chunks(); }, 1);
   if (failure == 0 && ::fsync(spool.get()) != 0) failure = errno;
   struct Placed {
     std::uint64_t cell = 0;

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "protocol/json/documents.h"
+#include "protocol/json/requests.h"
 #include "server/store/row_time.h"
 
 namespace pointwright::server {
@@ -34,9 +36,6 @@ std::int64_t count_all(Database::Access& access) {
   return count.integer(0);
 }
 
-/// Callers are a token's id and, of a share link, its session's: guests count with who shared it.
-constexpr int kIdLength = 22;
-
 /// As many as each may keep, so that all keep `goal` at most; 0 where there are more callers than that.
 std::int64_t level_of(std::vector<std::int64_t> counts, std::int64_t goal) {
   std::sort(counts.begin(), counts.end());
@@ -49,33 +48,30 @@ std::int64_t level_of(std::vector<std::int64_t> counts, std::int64_t goal) {
   return counts.empty() ? 0 : counts.back();
 }
 
-/// Whoever has most of them loses the oldest ones, until no more than `goal` are left.
+/// Whoever has most of them loses the oldest ones, until no more than `goal` are left. Callers are a token's
+/// id and, of a share link, its session's: guests count with who shared it.
 /// Cost: O(N log N)
 void shrink_to(Database::Access& access, std::int64_t goal) {
-  std::vector<std::string> owners;
+  constexpr auto kOwnerLength = static_cast<std::int64_t>(protocol::kIdLength);
   std::vector<std::int64_t> counts;
   {
-    Statement row =
-        access.query("SELECT substr(caller, 1, ?) AS owner, count(*) FROM answers GROUP BY owner", kIdLength);
-    while (row.step()) {
-      owners.push_back(row.text(0));
-      counts.push_back(row.integer(1));
-    }
+    Statement row = access.query("SELECT count(*) FROM answers GROUP BY substr(caller, 1, ?)", kOwnerLength);
+    while (row.step()) counts.push_back(row.integer(0));
   }
-  const std::int64_t level = level_of(counts, goal);
-  for (std::size_t i = 0; level > 0 && i < owners.size(); ++i) {
-    if (counts[i] <= level) continue;
+  if (const std::int64_t level = level_of(std::move(counts), goal); level > 0) {
     access.run(
-        "DELETE FROM answers WHERE (caller, key) IN (SELECT caller, key FROM answers "
-        "WHERE substr(caller, 1, ?) = ? ORDER BY created LIMIT ?)",
-        kIdLength, owners[i], counts[i] - level);
+        "DELETE FROM answers WHERE (caller, key) IN (SELECT caller, key FROM (SELECT caller, key, "
+        "row_number() "
+        "OVER (PARTITION BY substr(caller, 1, ?) ORDER BY created DESC, key DESC) AS place FROM answers) "
+        "WHERE place > ?)",
+        kOwnerLength, level);
+    return;
   }
   // More owners than room: of them, too, who came first.
-  if (const std::int64_t over = count_all(access) - goal; over > 0)
-    access.run(
-        "DELETE FROM answers WHERE (caller, key) IN "
-        "(SELECT caller, key FROM answers ORDER BY created LIMIT ?)",
-        over);
+  access.run(
+      "DELETE FROM answers WHERE (caller, key) IN "
+      "(SELECT caller, key FROM answers ORDER BY created LIMIT ?)",
+      count_all(access) - goal);
 }
 
 }  // namespace

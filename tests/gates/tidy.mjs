@@ -29,6 +29,11 @@ const testChecks = "-*,readability-identifier-naming,performance-for-range-copy"
 const checksFor = (path) => (path.startsWith("tests/") ? testChecks : sourceChecks);
 const cache = resolve(root, "build/checks/tidy");
 
+async function configure(...options) {
+  const { status, output } = await run("cmake", ["--preset", "release", ...options]);
+  if (status !== 0) throw new Error(`the release build cannot be configured:\n${output}`);
+}
+
 /**
  * The compiler's flags per source, as the release build has them, which compiles sources in batches: everything but the
  * compiler, -o, -c, the file and, unless asked for, the precompiled headers.
@@ -36,13 +41,10 @@ const cache = resolve(root, "build/checks/tidy");
 export async function compileFlags({ precompiled = false } = {}) {
   const dropped = precompiled ? ["-c", "-o"] : ["-c", "-o", "-include", "-Winvalid-pch"];
   const apart = resolve(root, "build/checks/flags");
-  const configured = await run("cmake", ["--preset", "release", "-B", apart, "-DPOINTWRIGHT_BATCHES=OFF"]);
-  if (configured.status !== 0)
-    throw new Error(`the release build cannot be configured:\n${configured.output}`);
-  const commands = readFileSync(resolve(apart, "compile_commands.json"), "utf8");
   const release = resolve(root, "build/release");
-  if (precompiled && !existsSync(resolve(release, "build.ninja")))
-    await run("cmake", ["--preset", "release"]);
+  await configure("-B", apart, "-DPOINTWRIGHT_BATCHES=OFF");
+  if (!existsSync(resolve(release, "build.ninja"))) await configure();
+  const commands = readFileSync(resolve(apart, "compile_commands.json"), "utf8");
   const flags = new Map();
   for (const { file, command } of JSON.parse(commands.replaceAll(apart, release))) {
     // The commands are written for a shell: a definition's quotes come with backslashes.

@@ -2025,7 +2025,7 @@ export interface components {
         OwedIfMatch: string;
         /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
         IfMatch: string;
-        /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+        /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
         IdempotencyKey: string;
         IfNoneMatch: string;
         /**
@@ -2422,7 +2422,7 @@ export interface operations {
                 nonfinite?: "drop" | "reject";
             };
             header?: {
-                /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
                 /** @description `respond-async`: do not wait for the cloud (RFC 7240) */
                 Prefer?: string;
@@ -2943,7 +2943,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
             };
             path?: never;
@@ -3256,7 +3256,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
                 /** @description Refuse (412) unless the session is at this revision, as its ETag says it; or * for any */
                 "If-Match"?: components["parameters"]["IfMatch"];
@@ -3420,7 +3420,7 @@ export interface operations {
         parameters: {
             query?: never;
             header: {
-                /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
                 /** @description The revision that the edit was made for, as the session's ETag says it; or * for any */
                 "If-Match": string;
@@ -3528,7 +3528,7 @@ export interface operations {
             header: {
                 /** @description The revision that the change is made for, as the session's ETag says it; or * for any */
                 "If-Match": components["parameters"]["OwedIfMatch"];
-                /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
             };
             path: {
@@ -3617,7 +3617,7 @@ export interface operations {
         parameters: {
             query?: never;
             header: {
-                /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
                 /** @description The revision that the recipe is applied to, as the session's ETag says it; or * for any */
                 "If-Match": string;
@@ -3797,7 +3797,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
             };
             path?: never;
@@ -3878,7 +3878,7 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description A key of the client's own, for one request: sent again within a day (where `max_kept_answers` is reached, whoever has most loses the oldest sooner), also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
                 "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
             };
             path: {

@@ -46,6 +46,7 @@ export class JobLog {
   }
 
   private async run(signal: AbortSignal, goesOn: () => boolean): Promise<void> {
+    let said = "";
     while (!signal.aborted) {
       // Before the reading: what is written until a job ends is there when it has ended.
       const isLast = !goesOn();
@@ -55,12 +56,15 @@ export class JobLog {
         const hasMore = next > this.next_;
         this.next_ = next;
         this.add(text);
+        said = "";
         if (hasMore) continue;
         if (isLast) return;
       } catch (error) {
         if (signal.aborted) return;
         const problem = problemOf(error);
-        this.add(`\n(${[problem.title, ...describeProblem(problem)].join(": ")})\n`);
+        const reason = `\n(${[problem.title, ...describeProblem(problem)].join(": ")})\n`;
+        if (reason !== said) this.add(reason);
+        said = reason;
         if (!isPassing(error) || isLast) return;
       }
       await new Promise((resolve) => setTimeout(resolve, POLL_MS));
