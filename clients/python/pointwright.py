@@ -1637,8 +1637,8 @@ class Job:
         return content.decode("utf-8", "replace"), offset + len(content)
 
     def cancel(self) -> "Job":
-        """Dismisses the job."""
-        response = self.client.request("DELETE", self._path)
+        """Dismisses the job. One that has ended stays as it is, with its results: a Conflict."""
+        response = self.client.request("DELETE", self._path, params={"only": "dismiss"})
         if response.content:
             self.document = response.json()
         return self
@@ -1662,5 +1662,5 @@ class Job:
         raise ValueError(f"the job has made no {name or 'file'}")
 
     def delete(self) -> None:
-        """Forgets a job that has ended, with its results."""
-        self.client.request("DELETE", self._path)
+        """Forgets a job that has ended, with its results. One that has not ended goes on: a Conflict."""
+        self.client.request("DELETE", self._path, params={"only": "forget"})

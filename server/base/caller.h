@@ -22,6 +22,8 @@ struct Caller {
   Scope scope = Scope::kAdmin;
   std::optional<std::string> session = std::nullopt;  ///< a share link opens this one alone
 
+  /// Whose Idempotency-Keys these are: guests have their own, those of a session in common.
+  [[nodiscard]] std::string key_owner() const { return token + session.value_or(""); }
   [[nodiscard]] bool may(Scope needed) const { return scope >= needed; }
   /// Whether the caller learns that a cloud, image or upload with this owner exists.
   [[nodiscard]] bool may_see(std::string_view owner) const {

@@ -1,3 +1,4 @@
+#include "server/base/sha256.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/query.h"
 
@@ -24,14 +25,19 @@ Response upload_image(Service& service, const Request& request) {
       service.access.hold(request.caller, {{Quota::kStoredBytes, request.body.size()}, {Quota::kImages, 1}});
   if (!quota.ok()) return problem_response(quota.problem(), request);
   const auto begin = std::chrono::steady_clock::now();
-  const auto image = service.images.add(service.decode_image, request.body_bytes(), request.caller.token,
-                                        std::move(quota.value()));
+  const auto answer = [sha256 = sha256_hex(request.body_bytes())](const protocol::ImageDocument& document) {
+    return json_response(protocol::to_json(document), 201)
+        .with_header("Location", "/v1/images/" + document.id)
+        .with_header("ETag", etag_of({sha256}));
+  };
+  const auto image =
+      service.images.add(service.decode_image, request.body_bytes(), request.caller.token,
+                         std::move(quota.value()), sealed<protocol::ImageDocument>(request, answer));
   if (!image.ok()) return problem_response(image.problem(), request);
-  Response response = json_response(protocol::to_json(image.value()->document), 201);
+  Response response = answer_of(request, image.value()->document, answer);
   response.timings.emplace_back(
       "decode", std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-  return response.with_header("Location", "/v1/images/" + image.value()->document.id)
-      .with_header("ETag", content_tag(*image.value()));
+  return response;
 }
 
 Response get_image(Service& service, const Request& request) {

@@ -284,7 +284,13 @@ Response get_job(Service& service, const Request& request) {
 }
 
 Response delete_job(Service& service, const Request& request) {
-  const auto job = service.jobs.dismiss(request.captures.at(0));
+  using enum JobQueue::Dismissal;
+  constexpr std::array<std::string_view, 2> kNames{"dismiss", "forget"};
+  constexpr std::array<JobQueue::Dismissal, 2> kOnly{kDismiss, kForget};
+  const auto only = query_choice(request.head, "only", kNames);
+  if (!only.ok()) return problem_response(only.problem(), request);
+  const auto job =
+      service.jobs.dismiss(request.captures.at(0), only.value() ? kOnly.at(*only.value()) : kEither);
   if (!job.ok()) return problem_response(job.problem(), request);
   return json_response(protocol::to_json(job.value()));
 }

@@ -138,7 +138,7 @@ Response answer_once(Service& service, const Request& request, Handler handler) 
     asked += std::string(request.head.header(name).value_or("")) + "\n";
   asked += sha256_hex(request.body_bytes());
   request.keyed = std::make_shared<KeyedRequest>(
-      KeyedRequest{.caller = request.caller.token + request.caller.session.value_or(""),
+      KeyedRequest{.caller = request.caller.key_owner(),
                    .key = std::string(*key),
                    .fingerprint = sha256_hex(std::as_bytes(std::span(asked.data(), asked.size())))});
   auto claim = service.answers.claim(request.keyed->caller, request.keyed->key, request.keyed->fingerprint);

@@ -253,16 +253,22 @@ std::vector<JobDocument> JobQueue::list(const std::function<bool(const std::stri
   return documents;
 }
 
-Outcome<JobDocument> JobQueue::dismiss(const std::string& id) {
+Outcome<JobDocument> JobQueue::dismiss(const std::string& id, Dismissal only) {
   std::string left;
   JobDocument seen;
   {
     const std::lock_guard lock(mutex_);
     const SharedEntry entry = find_locked(id);
     if (entry == nullptr) return no_such_job();
+    const bool has_ended = entry->kept.document.has_ended();
+    if (has_ended ? only == Dismissal::kDismiss : only == Dismissal::kForget)
+      return Problem{.kind = ProblemKind::kWrongState,
+                     .detail = std::string(has_ended ? "the job has ended already: it is "
+                                                     : "the job has not ended yet: it is ")
+                                   .append(job_status_name(entry->kept.document.status))};
     if (entry->has_worker && entry->must_end)
       return Problem{.kind = ProblemKind::kWrongState, .detail = "the job's worker is still ending"};
-    if (entry->kept.document.has_ended()) {
+    if (has_ended) {
       if (auto removed = archive_.remove(id); !removed.ok()) return removed.problem();
       seen = seen_locked(*entry);
       std::erase(entries_, entry);
@@ -345,7 +351,10 @@ std::vector<std::string> JobQueue::recover(const std::function<void(KeptJob&)>& 
     JobDocument& document = entry->kept.document;
     document.progress = {.phase = "waiting", .fraction = 0.0};
     if (document.has_ended()) {
-      if (document.status == JobStatus::kSuccessful) document.progress = {.phase = "done", .fraction = 1.0};
+      if (document.status == JobStatus::kSuccessful) {
+        document.progress = {.phase = "done", .fraction = 1.0};
+        remove_inputs(document.id);
+      }
     } else {
       document.status = JobStatus::kAccepted;
       document.message = document.attempts > 0 ? "waits to go on where it was" : "waits for its turn";

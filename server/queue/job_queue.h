@@ -60,9 +60,11 @@ class JobQueue {
   /// Of the owners that may be seen, newest first.
   [[nodiscard]] std::vector<protocol::JobDocument> list(
       const std::function<bool(const std::string&)>& may_see) const;
+  /// What dismiss() may do: where the job has come to be in another state, nothing is done.
+  enum class Dismissal { kEither, kDismiss, kForget };
   /// Ends a job that waits or runs; its checkpoints stay. One that has ended is forgotten, with its files.
-  /// Problems: not found, those of the archive
-  Outcome<protocol::JobDocument> dismiss(const std::string& id);
+  /// Problems: not found, wrong state, those of the archive
+  Outcome<protocol::JobDocument> dismiss(const std::string& id, Dismissal only = Dismissal::kEither);
   /// Puts a job that failed or was dismissed back into the queue; it goes on from its checkpoints.
   /// Problems: not found, wrong state, too many, those of the archive
   Outcome<protocol::JobDocument> restart(const std::string& id, std::shared_ptr<const void> quota);
@@ -102,6 +104,8 @@ class JobQueue {
   void take_line(const SharedEntry& entry, const std::string& line, std::string& last);
   void settle(const SharedEntry& entry, const ChildEnd& end, const std::string& last);
   bool keep_locked(Entry& entry);  // whether it could
+  /// Nobody starts a job again that was successful: what it was made from goes.
+  void remove_inputs(const std::string& id) const;
   void note(const std::string& id, const std::string& text) const;
   [[nodiscard]] SharedEntry take_expired_locked();
   /// Where there are as many as may be: the job that ended longest ago, of whoever holds most; taken out.

@@ -150,9 +150,12 @@ void JobQueue::settle(const SharedEntry& entry, const ChildEnd& end, const std::
   if (word.report) document.report = *word.report;
   if (document.status == JobStatus::kSuccessful) document.progress = {.phase = "done", .fraction = 1.0};
   note(id, std::string(job_status_name(document.status)).append(": ").append(document.message));
-  const bool is_kept = keep_locked(*entry);
-  if (!is_kept || document.status != JobStatus::kSuccessful) return;
-  std::error_code none;  // nobody starts it again, not even a daemon that was ended before it knew
+  // Where it could not be kept, the next daemon knows it as running.
+  if (keep_locked(*entry) && document.status == JobStatus::kSuccessful) remove_inputs(id);
+}
+
+void JobQueue::remove_inputs(const std::string& id) const {
+  std::error_code none;  // what stays goes with the next start
   for (const char* const name : {kInputName, kPreviewName})
     std::filesystem::remove(folder_of(id) + "/" + name, none);
 }

@@ -45,7 +45,7 @@ constexpr std::array kRoutes = {
     Route{kGet, "/v1/jobs", Body::kNone, list_jobs, kByMethod, kOften, "status limit"},
     Route{kPost, "/v1/jobs", Body::kLargeJson, create_job, kOwner, kOnce},
     Route{kGet, "/v1/jobs/{id}", Body::kNone, get_job},
-    Route{kDelete, "/v1/jobs/{id}", Body::kNone, delete_job},
+    Route{kDelete, "/v1/jobs/{id}", Body::kNone, delete_job, kByMethod, kOften, "only"},
     Route{kPost, "/v1/jobs/{id}/restart", Body::kNone, restart_job, kByMethod, kOnce},
     Route{kGet, "/v1/jobs/{id}/log", Body::kNone, get_job_log, kByMethod, kOften, "offset"},
     Route{kGet, "/v1/jobs/{id}/events", Body::kNone, get_job_events},
@@ -57,7 +57,7 @@ constexpr std::array kRoutes = {
     Route{kPatch, "/v1/uploads/{id}", Body::kUpload, patch_upload},
     Route{kDelete, "/v1/uploads/{id}", Body::kNone, delete_upload},
     Route{kGet, "/v1/images", Body::kNone, list_images},
-    Route{kPost, "/v1/images", Body::kImage, upload_image, kOwner},
+    Route{kPost, "/v1/images", Body::kImage, upload_image, kOwner, kOnce},
     Route{kGet, "/v1/images/{id}", Body::kNone, get_image},
     Route{kDelete, "/v1/images/{id}", Body::kNone, delete_image},
     Route{kGet, "/v1/images/{id}/data", Body::kNone, get_image_data},
@@ -132,18 +132,32 @@ BodyPolicy policy_of(const Route& route, const Limits& limits) {
   return {};
 }
 
+/// Whether there is room for what the body of an upload is to become, before it is read. A request that comes
+/// once more gets the answer that it got, whatever there is room for now.
+Outcome<Done> admit_upload(Service& service, const BodyPolicy& policy, const RequestHead& head,
+                           const Caller& caller) {
+  const auto key = head.header("idempotency-key");
+  if (key && service.answers.has(caller.key_owner(), std::string(*key))) return Done{};
+  const bool is_cloud = policy.kind == Body::kCloud;
+  if (auto room = is_cloud ? service.clouds.check_room() : service.images.check_room(); !room.ok())
+    return room;
+  const auto held = service.access.hold(caller, {{Quota::kStoredBytes, head.content_length.value_or(0)},
+                                                 {is_cloud ? Quota::kClouds : Quota::kImages, 1}});
+  return held.ok() ? Outcome<Done>(Done{}) : held.problem();
+}
+
 /// Where the bytes of a body are held from as they arrive. Documents have a reserve of their own, so that no
 /// upload keeps a hand waiting. A body for which there is no room now is refused before it is read; one over
 /// its limit is let through: the fence refuses it.
-Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const RequestHead& head) {
+Outcome<Budget*> admit_body(Service& service, const BodyPolicy& policy, const RequestHead& head,
+                            const Caller& caller) {
   const bool is_upload = policy.kind == Body::kCloud || policy.kind == Body::kImage;
   Budget& memory = is_upload ? service.upload_memory : service.json_memory;
   const std::uint64_t length = head.content_length.value_or(0);
   if (length > policy.max_bytes) return &memory;
-  if (policy.kind == Body::kCloud)
-    if (auto room = service.clouds.check_room(); !room.ok()) return room.problem();
-  if (policy.kind == Body::kImage)
-    if (auto room = service.images.check_room(); !room.ok()) return room.problem();
+  if (is_upload)
+    if (auto admitted = admit_upload(service, policy, head, caller); !admitted.ok())
+      return admitted.problem();
   const std::uint64_t held = memory.held();
   if (length > memory.total() - held)
     return Problem{.kind = ProblemKind::kOverloaded,
@@ -261,7 +275,7 @@ Resolution endpoint_of(Service& service, const Route& route, std::vector<std::st
     const auto open = route.method == kPost ? open_new_upload : open_upload;
     endpoint.open_target = [&service, open](const Request& r) { return open(service, r); };
   } else if (route.body != Body::kNone) {
-    auto admitted = admit_body(service, endpoint.body, head);
+    auto admitted = admit_body(service, endpoint.body, head, caller.value());
     if (!admitted.ok()) return problem_response(admitted.problem(), head.path, request_id);
     endpoint.body_memory = admitted.value();
     if (endpoint.body_memory == &service.upload_memory)

@@ -117,6 +117,14 @@ std::optional<KeptAnswer> Answers::find(const std::string& caller, const std::st
   });
 }
 
+bool Answers::has(const std::string& caller, const std::string& key) {
+  {
+    const std::lock_guard lock(under_way_->mutex);
+    if (under_way_->names.contains(Name(caller, key))) return true;
+  }
+  return find(caller, key).has_value();
+}
+
 Outcome<Done> Answers::make_room(const std::string& caller) {
   // Nobody takes keys away from callers that have fewer of them.
   const std::lock_guard lock(room_mutex_);

@@ -28,6 +28,9 @@ class Answers {
   /// Where as many are kept as may be, those are forgotten first that came first, of whoever has most.
   /// Problems: the key came with another request, the first one is still under way
   Outcome<Claim> claim(const std::string& caller, const std::string& key, const std::string& fingerprint);
+  /// Whether a request with the key has been answered, or is being answered: one more needs nothing of what
+  /// the first one took.
+  [[nodiscard]] bool has(const std::string& caller, const std::string& key);
   /// Keeps an answer as part of a change; one that is there already stays.
   static void put(Database::Access& access, const KeptAnswer& answer);
   /// Keeps an answer by itself.

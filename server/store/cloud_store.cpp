@@ -49,10 +49,10 @@ std::string cloud_hash(const Cloud& cloud) {
 }
 
 CloudStore::CloudStore(const Limits& limits, Archive* archive, CloudLoader load)
-    : max_clouds_(limits.max_clouds),
-      archive_(archive),
+    : archive_(archive),
       load_(std::move(load)),
-      memory_(limits.max_cloud_bytes) {}
+      memory_(limits.max_cloud_bytes),
+      places_("clouds", limits.max_clouds) {}
 
 Problem CloudStore::out_of_space(std::uint64_t bytes) const {
   return {.kind = ProblemKind::kOutOfSpace,
@@ -92,17 +92,9 @@ void CloudStore::restore(std::vector<KeptCloud> clouds) {
   }
 }
 
-Outcome<Done> CloudStore::check_room_locked() const {
-  if (clouds_.size() + coming_ < max_clouds_) return Done{};
-  return Problem{.kind = ProblemKind::kTooMany,
-                 .detail = "the server holds as many clouds as it may",
-                 .limit = static_cast<double>(max_clouds_),
-                 .actual = static_cast<double>(clouds_.size() + coming_)};
-}
-
 Outcome<Done> CloudStore::check_room() const {
   const std::lock_guard lock(mutex_);
-  return check_room_locked();
+  return places_.check(clouds_.size());
 }
 
 Outcome<SharedCloud> CloudStore::add(NewCloud cloud, const BlobContent& file,
@@ -118,31 +110,17 @@ Outcome<SharedCloud> CloudStore::add(NewCloud cloud, const BlobContent& file,
   stored->source = cloud.source;
   if (archive_ != nullptr) stored->content = cloud_hash(cloud.cloud);
   stored->cloud_ = std::make_shared<const Cloud>(std::move(cloud.cloud));
-  {
-    const std::lock_guard lock(mutex_);
-    if (auto room = check_room_locked(); !room.ok()) return room.problem();
-    ++coming_;
-  }
-  Outcome<Done> kept = Done{};
-  if (archive_ != nullptr) {
-    try {
-      std::optional<KeptAnswer> answer;
-      if (seal) answer = seal(stored->document);
-      kept = archive_->add({.document = stored->document,
-                            .source = stored->source,
-                            .content = stored->content,
-                            .owner = stored->owner},
-                           file, answer ? &*answer : nullptr);
-    } catch (...) {
-      const std::lock_guard lock(mutex_);
-      --coming_;
-      throw;
-    }
-  }
-  const std::lock_guard lock(mutex_);
-  --coming_;
-  if (!kept.ok()) return kept.problem();
-  clouds_.push_back(stored);
+  auto entered = places_.enter(mutex_, clouds_, stored, [&]() -> Outcome<Done> {
+    if (archive_ == nullptr) return Done{};
+    std::optional<KeptAnswer> answer;
+    if (seal) answer = seal(stored->document);
+    return archive_->add({.document = stored->document,
+                          .source = stored->source,
+                          .content = stored->content,
+                          .owner = stored->owner},
+                         file, answer ? &*answer : nullptr);
+  });
+  if (!entered.ok()) return entered.problem();
   return SharedCloud(stored);
 }
 

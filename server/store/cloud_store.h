@@ -16,6 +16,7 @@
 #include "server/base/outcome.h"
 #include "server/config/limits.h"
 #include "server/store/archive.h"
+#include "server/store/places.h"
 
 namespace pointwright::server {
 
@@ -84,20 +85,18 @@ class CloudStore {
   [[nodiscard]] const Budget& memory() const { return memory_; }
 
  private:
-  [[nodiscard]] Outcome<Done> check_room_locked() const;
   [[nodiscard]] protocol::Problem out_of_space(std::uint64_t bytes) const;
   /// A part of the budget, for which samples are let go that nobody holds, those first that were asked for
   /// longest ago. Null where there is none. `loading`: the cloud that it is for, locked by the caller.
   [[nodiscard]] std::shared_ptr<void> room_for(std::uint64_t bytes, const StoredCloud* loading) const;
 
-  const std::uint64_t max_clouds_;
   Archive* const archive_;
   const CloudLoader load_;
   mutable Budget memory_;
   mutable std::atomic<std::uint64_t> asking_{0};
   mutable std::mutex mutex_;  // guards what follows
   std::vector<SharedCloud> clouds_;
-  std::size_t coming_ = 0;  // clouds that are being stored
+  Places places_;
 };
 
 }  // namespace pointwright::server

@@ -46,10 +46,10 @@ ImageDecoder confined_image_decoder(const Limits& limits, std::shared_ptr<Decode
 }
 
 ImageStore::ImageStore(const Limits& limits, Archive* archive)
-    : max_images_(limits.max_images),
-      limits_(image_limits(limits)),
+    : limits_(image_limits(limits)),
       archive_(archive),
-      memory_(limits.max_image_bytes) {}
+      memory_(limits.max_image_bytes),
+      places_("images", limits.max_images) {}
 
 void ImageStore::restore(std::vector<KeptImage> images) {
   const std::lock_guard lock(mutex_);
@@ -63,17 +63,9 @@ void ImageStore::restore(std::vector<KeptImage> images) {
   }
 }
 
-Outcome<Done> ImageStore::check_room_locked() const {
-  if (images_.size() < max_images_) return Done{};
-  return Problem{.kind = ProblemKind::kTooMany,
-                 .detail = "the server holds as many images as it may",
-                 .limit = static_cast<double>(max_images_),
-                 .actual = static_cast<double>(images_.size())};
-}
-
 Outcome<Done> ImageStore::check_room() const {
   const std::lock_guard lock(mutex_);
-  return check_room_locked();
+  return places_.check(images_.size());
 }
 
 Outcome<std::shared_ptr<const ImageContent>> ImageStore::decoded(const ImageDecoder& decode,
@@ -118,7 +110,8 @@ std::shared_ptr<Budget::Hold> ImageStore::room_for(std::uint64_t bytes, const St
 }
 
 Outcome<SharedImage> ImageStore::add(const ImageDecoder& decode, std::span<const std::byte> file,
-                                     std::string owner, std::shared_ptr<const void> quota) {
+                                     std::string owner, std::shared_ptr<const void> quota,
+                                     const Seal<protocol::ImageDocument>& seal) {
   if (file.empty()) return Problem{.kind = ProblemKind::kEmptyBody, .detail = "the upload has no bytes"};
   auto content = decoded(decode, file, nullptr);
   if (!content.ok()) return content.problem();
@@ -134,19 +127,15 @@ Outcome<SharedImage> ImageStore::add(const ImageDecoder& decode, std::span<const
   stored->quota = std::move(quota);
   stored->sha256 = sha256_hex(file);
   stored->content_ = std::move(content.value());
-  if (auto room = check_room(); !room.ok()) return room.problem();
-  if (archive_ != nullptr) {
-    auto kept = archive_->add(
+  auto entered = places_.enter(mutex_, images_, stored, [&]() -> Outcome<Done> {
+    if (archive_ == nullptr) return Done{};
+    std::optional<KeptAnswer> answer;
+    if (seal) answer = seal(stored->document);
+    return archive_->add(
         KeptImage{.document = stored->document, .sha256 = stored->sha256, .owner = stored->owner}, file,
-        nullptr);
-    if (!kept.ok()) return kept.problem();
-  }
-  const std::lock_guard lock(mutex_);
-  if (auto room = check_room_locked(); !room.ok()) {
-    if (archive_ != nullptr) (void)archive_->remove_image(stored->document.id, stored->sha256);
-    return room.problem();
-  }
-  images_.push_back(stored);
+        answer ? &*answer : nullptr);
+  });
+  if (!entered.ok()) return entered.problem();
   return SharedImage(stored);
 }
 

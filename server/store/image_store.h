@@ -18,6 +18,7 @@
 #include "server/ingest/decode_slots.h"
 #include "server/ingest/png_reader.h"
 #include "server/store/archive.h"
+#include "server/store/places.h"
 
 namespace pointwright::server {
 
@@ -61,7 +62,8 @@ class ImageStore {
   /// Problems: empty body, everything that decoding refuses, overloaded, too many images, out of space;
   /// those of the archive.
   Outcome<SharedImage> add(const ImageDecoder& decode, std::span<const std::byte> file,
-                           std::string owner = {}, std::shared_ptr<const void> quota = {});
+                           std::string owner = {}, std::shared_ptr<const void> quota = {},
+                           const Seal<protocol::ImageDocument>& seal = {});
   /// From the archive where it is not there. Problems: damaged, out of space, overloaded.
   [[nodiscard]] Outcome<std::shared_ptr<const ImageContent>> content_of(const ImageDecoder& decode,
                                                                         const StoredImage& image) const;
@@ -74,7 +76,6 @@ class ImageStore {
   [[nodiscard]] const Budget& memory() const { return memory_; }
 
  private:
-  [[nodiscard]] Outcome<Done> check_room_locked() const;
   [[nodiscard]] Outcome<std::shared_ptr<const ImageContent>> decoded(const ImageDecoder& decode,
                                                                      std::span<const std::byte> file,
                                                                      const StoredImage* loading) const;
@@ -82,12 +83,12 @@ class ImageStore {
   /// there is none. `loading`: the image that it is for, locked by the caller.
   [[nodiscard]] std::shared_ptr<Budget::Hold> room_for(std::uint64_t bytes, const StoredImage* loading) const;
 
-  const std::uint64_t max_images_;
   const ImageLimits limits_;
   Archive* const archive_;
   mutable Budget memory_;
-  mutable std::mutex mutex_;  // guards images_
+  mutable std::mutex mutex_;  // guards what follows
   std::vector<SharedImage> images_;
+  Places places_;
 };
 
 }  // namespace pointwright::server

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <thread>
 
+#include "server/store/upload_store.h"
 #include "tests/acceptance/bodies.h"
 #include "tests/acceptance/daemon.h"
 #include "tests/server/raw_client.h"
@@ -248,7 +249,12 @@ TEST_CASE("jobs go by priority; one that is dismissed ends at once, and goes on 
   CHECK(daemon.get(path_of(low)).json()["queue_place"] == 3);
   CHECK(daemon.get(path_of(first) + "/results").status == 409);
 
-  const json dismissed = daemon.ask("DELETE", path_of(middle)).json();
+  const Reply early = daemon.ask("DELETE", path_of(middle) + "?only=forget");
+  CHECK(early.status == 409);
+  CHECK(early.json()["type"] == "/problems/wrong-state");
+  CHECK(daemon.ask("DELETE", path_of(middle) + "?only=both").status == 422);
+  CHECK(status_of(daemon, middle) == "accepted");
+  const json dismissed = daemon.ask("DELETE", path_of(middle) + "?only=dismiss").json();
   CHECK(dismissed["status"] == "dismissed");
   const auto before = std::chrono::steady_clock::now();
   CHECK(daemon.ask("DELETE", path_of(first)).json()["status"] == "dismissed");
@@ -259,6 +265,11 @@ TEST_CASE("jobs go by priority; one that is dismissed ends at once, and goes on 
   held.let_go();
   done(daemon, high);
   done(daemon, low);
+  // Dismissed as it ended: it keeps its results.
+  CHECK(daemon.ask("DELETE", path_of(low) + "?only=dismiss").status == 409);
+  CHECK(daemon.get(path_of(low) + "/results").status == 200);
+  CHECK(daemon.ask("DELETE", path_of(low) + "?only=forget").status == 200);
+  CHECK(daemon.get(path_of(low)).status == 404);
   CHECK(status_of(daemon, first) == "dismissed");
   const Reply again = daemon.ask("POST", path_of(first) + "/restart");
   CHECK(again.status == 202);
@@ -291,8 +302,14 @@ TEST_CASE("after kill -9 a job that ran goes on, one that waited waits, and no w
     daemon.stop(SIGKILL);
     CHECK(::kill(worker, 0) == 0);  // nobody has ended it
   }
+  // Ended between what it keeps of the job and what it removes of it.
+  const std::string input =
+      folder / "data/jobs/" + finished["jobID"].get<std::string>() + "/" + server::kJobInputName;
+  CHECK_FALSE(std::filesystem::exists(input));
+  std::ofstream(input) << "left";
   Daemon daemon(arguments);
   CHECK(becomes([&] { return ::kill(worker, 0) != 0; }, std::chrono::seconds(5)));
+  CHECK_FALSE(std::filesystem::exists(input));
   CHECK(daemon.get(path_of(finished)).json()["report"] == finished["report"]);
   CHECK(daemon.get(path_of(finished) + "/results/result.ply").body == bytes);
   CHECK(becomes([&] { return status_of(daemon, running) == "running"; }));

@@ -447,6 +447,56 @@ TEST_CASE("quotas bound one token, with the limit in the answer, and nobody else
   CHECK(guarded.get(guarded.ann, "/v1/info").status == 200);
 }
 
+TEST_CASE("what a token holds counts after a restart, and full quotas refuse no repeated request") {
+  const TemporaryFolder folder;
+  const std::vector<std::string> kept = {"--data", folder / "data"};
+  Guarded guarded(kept);
+  const std::string one = guarded.add("One", "edit", {"--clouds", "1", "--images", "1"});
+  ::kill(guarded.daemon.pid(), SIGHUP);
+  for (int i = 0; i < 500 && guarded.get(one, "/v1/info").status != 200; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  const std::string page = grey_png(2, 2, [](auto, auto) { return 9; });
+  const std::string bearer = "Authorization: Bearer " + one + "\r\n";
+  const auto cloud = [&](Daemon& daemon, const std::string& key) {
+    return daemon.ask("POST", "/v1/clouds", sheet(),
+                      bearer + "Content-Type: application/x-ply\r\nIdempotency-Key: " + key + "\r\n");
+  };
+  const auto image = [&](Daemon& daemon, const std::string& key) {
+    return daemon.ask("POST", "/v1/images", page,
+                      bearer + "Content-Type: image/png\r\nIdempotency-Key: " + key + "\r\n");
+  };
+  const auto used = [&](Daemon& daemon, const char* quota) {
+    return daemon.get("/v1/info", bearer).json()["caller"]["quotas"][quota]["used"].get<std::size_t>();
+  };
+  const Reply first_cloud = cloud(guarded.daemon, "c");
+  const Reply first_image = image(guarded.daemon, "i");
+  REQUIRE(first_cloud.status == 201);
+  REQUIRE(first_image.status == 201);
+  const auto check = [&](Daemon& daemon) {
+    CHECK(used(daemon, "clouds") == 1);
+    CHECK(used(daemon, "images") == 1);
+    CHECK(used(daemon, "stored_bytes") == sheet().size() + page.size());
+    const std::size_t before = used(daemon, "upload_bytes_per_day");
+    CHECK(cloud(daemon, "c2").status == 429);
+    CHECK(image(daemon, "i2").status == 429);
+    // Refused by their heads: their bytes do not count.
+    CHECK(used(daemon, "upload_bytes_per_day") == before);
+    const Reply same_cloud = cloud(daemon, "c");
+    const Reply same_image = image(daemon, "i");
+    CHECK(same_cloud.status == 201);
+    CHECK(same_cloud.body == first_cloud.body);
+    CHECK(same_image.status == 201);
+    CHECK(same_image.body == first_image.body);
+    CHECK(same_image.headers.at("etag") == first_image.headers.at("etag"));
+    CHECK(same_image.headers.at("idempotency-replayed") == "true");
+    CHECK(daemon.get("/v1/images", bearer).json()["images"].size() == 1);
+  };
+  check(guarded.daemon);
+  CHECK(guarded.daemon.stop(SIGTERM) == 0);
+  Daemon again(guarded.arguments(kept));
+  check(again);
+}
+
 TEST_CASE("tokens are bounded, and so is each one's part of the resumable uploads") {
   Guarded guarded({"--max-tokens", "5", "--token-uploads", "2", "--token-upload-file-bytes", "1000"});
   const auto add = [&] {

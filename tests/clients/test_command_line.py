@@ -172,6 +172,10 @@ class Jobs(CommandLine):
             if path == "/v1/jobs/j1/results/result.ply":
                 return 200, {}, b"part"
             if method == "DELETE":
+                ended = states[0][0] == "successful"
+                if path != f"/v1/jobs/j1?only={'forget' if ended else 'dismiss'}":
+                    problem = {"type": "/problems/wrong-state", "title": "Wrong state", "detail": "the job has ended"}
+                    return document(problem, 409)
                 return document({"jobID": "j1", "status": "dismissed"})
             status, progress = states.pop(0) if len(states) > 1 else states[0]
             job = {"jobID": "j1", "status": status, "progress": progress}
@@ -198,8 +202,8 @@ class Jobs(CommandLine):
         states[:] = [("running", 40)]
         self.assertEqual(self.ask(fake, "job", "cancel", "j1").returncode, 0)
         states[:] = [("successful", 100)]
-        ended = self.ask(fake, "job", "cancel", "j1")  # that would delete its results
-        self.assertEqual(ended.returncode, 2)
+        ended = self.ask(fake, "job", "cancel", "j1")  # its results stay
+        self.assertEqual(ended.returncode, 4)
         self.assertIn(b"has ended", ended.stderr)
         self.assertEqual(self.ask(fake, "job", "delete", "j1").returncode, 0)
         states[:] = [("failed", 40)]

@@ -209,6 +209,7 @@ class Jobs(Served):
     """Against answers in the words of OGC API – Processes; a server with jobs answers the same."""
 
     def job_server(self, ending):
+        self.deletions = []
         states = [("accepted", 0), ("running", 40), (ending, 100)]
 
         def handle(request):
@@ -226,6 +227,7 @@ class Jobs(Served):
             if path == "/v1/jobs/j1/restart":
                 return document({"jobID": "j1", "status": "accepted"}, 202)
             if method == "DELETE":
+                self.deletions.append(path)
                 return document({"jobID": "j1", "status": "dismissed"})
             status, progress = states[0] if len(states) == 1 else states.pop(0)
             job = {"jobID": "j1", "status": status, "progress": progress, "message": "no room" if ending == "failed" else ""}
@@ -260,6 +262,8 @@ class Jobs(Served):
         self.assertEqual([entry.id for entry in client.jobs()], ["j1"])
         self.assertEqual(job.restart().status, "accepted")
         self.assertEqual(job.cancel().status, "dismissed")
+        job.delete()
+        self.assertEqual(self.deletions, ["/v1/jobs/j1?only=dismiss", "/v1/jobs/j1?only=forget"])
 
     def test_failures_say_why(self):
         job = self.job_server("failed").job("j1")

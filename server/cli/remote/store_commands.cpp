@@ -338,15 +338,12 @@ void add_job_commands(CLI::App& app, RemoteCommands& commands) {
                                   [&](const json& job) { tell_job(context.out, job); });
                    });
   CLI::App* const cancel = commands.add(*group, "cancel", "dismiss a job", [wanted](const Context& context) {
-    // The same request deletes the results of a job that has ended.
-    const std::string status = document_of(ask_jobs(context, "GET", job_path(*wanted))).value("status", "");
-    if (status != "accepted" && status != "running")
-      throw CommandFailure{.code = ExitCode::kRefused, .text = "the job has ended already: it is " + status};
-    (void)ask_jobs(context, "DELETE", job_path(*wanted));
+    (void)ask_jobs(context, "DELETE", job_path(*wanted) + "?only=dismiss");
   });
   CLI::App* const remove = commands.add(
-      *group, "delete", "forget a job that has ended, and its results",
-      [wanted](const Context& context) { (void)ask_jobs(context, "DELETE", job_path(*wanted)); });
+      *group, "delete", "forget a job that has ended, and its results", [wanted](const Context& context) {
+        (void)ask_jobs(context, "DELETE", job_path(*wanted) + "?only=forget");
+      });
   for (CLI::App* const command : {info, wait, log, fetch, restart, cancel, remove})
     command->add_option("JOB", wanted->id, "its id")->required();
 }

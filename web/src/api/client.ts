@@ -270,9 +270,14 @@ export class ApiClient {
     return (await this.send<{ estimate: JobEstimate }>("POST", "v1/jobs", body)).estimate;
   }
 
-  /** Dismisses a job, or forgets one that has ended. */
-  deleteJob(id: string): Promise<Job> {
-    return this.json(`v1/jobs/${id}`, { method: "DELETE" });
+  /** Ends a job that waits or runs; refused (409) where it has ended. */
+  dismissJob(id: string): Promise<Job> {
+    return this.json(`v1/jobs/${id}?only=dismiss`, { method: "DELETE" });
+  }
+
+  /** Forgets a job that has ended, and its results; refused (409) where it has not. */
+  forgetJob(id: string): Promise<Job> {
+    return this.json(`v1/jobs/${id}?only=forget`, { method: "DELETE" });
   }
 
   restartJob(id: string): Promise<Job> {

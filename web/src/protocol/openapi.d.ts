@@ -847,7 +847,7 @@ export interface paths {
         /**
          * Dismiss a job, or forget one that has ended
          * @description A worker ends within a second; what it has done so far stays for a restart. A job that has ended is forgotten, with its log and
-         *     its results.
+         *     its results. `only` does one of the two: a job that ends at that very moment keeps its results.
          */
         delete: operations["deleteJob"];
         options?: never;
@@ -2805,7 +2805,10 @@ export interface operations {
     uploadImage: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description A key of the client's own, for one request: sent again within a day, also after a restart, the request has no second effect and gets its first answer, with `Idempotency-Replayed: true`; where `max_kept_answers` is reached, whoever has most loses the oldest sooner. With another method, path or body it is refused (422, key-reused); while the first one is under way, 409 (key-in-use). Refusals are not remembered. */
+                "Idempotency-Key"?: components["parameters"]["IdempotencyKey"];
+            };
             path?: never;
             cookie?: never;
         };
@@ -3859,7 +3862,10 @@ export interface operations {
     };
     deleteJob: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Dismiss a job that has not ended, or forget one that has; else 409 */
+                only?: "dismiss" | "forget";
+            };
             header?: never;
             path: {
                 job: components["parameters"]["JobId"];

@@ -55,14 +55,10 @@ export function createJobList(client: ApiClient, options: JobListOptions): JobLi
     ({ request }) => session === undefined || request.session === session,
   );
   const actions: JobActions = {
-    // One request dismisses and forgets: a job that has ended meanwhile is to be kept.
-    dismiss: async ({ jobID }) => {
-      const now = await client.job(jobID);
-      feed.take(isActive(now) ? await client.deleteJob(jobID) : now);
-    },
+    dismiss: async ({ jobID }) => feed.take(await client.dismissJob(jobID)),
     restart: async ({ jobID }) => feed.take(await client.restartJob(jobID)),
     forget: async ({ jobID }) => {
-      await client.deleteJob(jobID);
+      await client.forgetJob(jobID);
       feed.remove(jobID);
     },
   };

@@ -59,12 +59,14 @@ test("an estimate asks for what the job would ask for, and does not begin it", a
 test("jobs are dismissed and started again below their own address", async () => {
   const { client, calls } = clientAnswering(() => json({ jobID: "j" }));
   await client.job("j");
-  await client.deleteJob("j");
+  await client.dismissJob("j");
+  await client.forgetJob("j");
   await client.restartJob("j");
   await client.jobResults("j");
   expect(calls.map(({ url, init }) => `${init?.method ?? "GET"} ${url}`)).toEqual([
     "GET http://host/sub/v1/jobs/j",
-    "DELETE http://host/sub/v1/jobs/j",
+    "DELETE http://host/sub/v1/jobs/j?only=dismiss",
+    "DELETE http://host/sub/v1/jobs/j?only=forget",
     "POST http://host/sub/v1/jobs/j/restart",
     "GET http://host/sub/v1/jobs/j/results",
   ]);
