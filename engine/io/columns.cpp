@@ -138,9 +138,6 @@ void take_colors(ColumnSet& columns, Cloud& cloud) {
   if (cloud.color_has_alpha) columns.remove("alpha");
 }
 
-constexpr std::array<std::array<const char*, 2>, 3> kTexCoordNames{
-    {{"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}}};
-
 void take_texcoords(ColumnSet& columns, Cloud& cloud) {
   for (const auto& [first, second] : kTexCoordNames) {
     const auto* s = columns.find_as<float>(first);

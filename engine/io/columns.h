@@ -14,6 +14,10 @@
 
 namespace pointwright {
 
+/// What texture coordinates are called, in the order of preference.
+inline constexpr std::array<std::array<const char*, 2>, 3> kTexCoordNames{
+    {{"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}}};
+
 /// Makes a cloud of named columns of equal length. Recognised: x y z (any type; required), nx ny nz, red
 /// green blue [alpha] as uint8, s t | u v | texture_u texture_v as float; every other column stays a scalar,
 /// in order. Normals of another length are scaled to unit length; where one has none, all three stay scalars.

@@ -1,6 +1,7 @@
 #include "engine/multires/sampling.h"
 
 #include <algorithm>
+#include <unordered_map>
 #include <utility>
 
 #include "engine/core/check.h"
@@ -20,6 +21,21 @@ Sampling rest_sampling(std::shared_ptr<const Cloud> cloud, std::shared_ptr<const
           .cell_u = {},
           .cell_v = {},
           .next_id = next_id};
+}
+
+std::vector<std::uint32_t> roots_of(const Sampling& sampling) {
+  std::vector<std::uint32_t> roots = sampling.cloud->id;
+  // Parents come before their children, and who was split from a sample that is gone was given to its parent.
+  std::unordered_map<std::uint32_t, std::uint32_t> root_of_inserted;  // by id
+  for (std::size_t i = 0; i < sampling.parent.size(); ++i) {
+    const std::uint32_t parent = sampling.parent[i];
+    if (parent == kNoParent) continue;
+    const auto found = root_of_inserted.find(parent);
+    const std::uint32_t root = found == root_of_inserted.end() ? parent : found->second;
+    root_of_inserted.emplace(sampling.cloud->id[i], root);
+    roots[i] = root;
+  }
+  return roots;
 }
 
 std::uint64_t memory_of(const Sampling& sampling) {

@@ -111,6 +111,7 @@ protocol::JsonDocument to_json(const JobReport& report, double seconds) {
           {"sample_count", report.samples},
           {"moved", report.moved},
           {"inserted", report.inserted},
+          {"removed", report.removed},
           {"tiles", report.tiles},
           {"tiles_kept", report.tiles_kept},
           {"preview",
@@ -204,7 +205,8 @@ Outcome<JobParams> params_of(const JobRunOptions& options) {
 
 void tell(std::ostream& out, const JobReport& report, double seconds) {
   out << "samples     " << report.samples << ", of which " << report.moved << " moved";
-  if (report.inserted > 0) out << ", and " << report.inserted << " were inserted";
+  if (report.inserted > 0) out << ", " << report.inserted << " were inserted";
+  if (report.removed > 0) out << ", " << report.removed << " were removed";
   out << "\nmode        " << kModeNames[static_cast<std::size_t>(report.mode)];
   if (report.tiles > 0) out << ", " << report.tiles << " of them";
   if (report.tiles_kept > 0) out << " (" << report.tiles_kept << " were done already)";

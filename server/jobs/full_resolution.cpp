@@ -35,9 +35,7 @@ struct Edited {
 
 /// The cloud as edited, in its own order; normals only where it had them.
 Cloud edited_cloud(const Cloud& cloud, const Edited& edited) {
-  const bool same_samples = edited.sampling->cloud->size() == cloud.size();
-  Cloud result = moved_cloud(same_samples ? cloud : *edited.sampling->cloud, edited.finest.position,
-                             edited.finest.normal);
+  Cloud result = moved_cloud(*edited.sampling->cloud, edited.finest.position, edited.finest.normal);
   if (!cloud.has_normals()) result.normal = Points();
   return result;
 }
@@ -141,14 +139,14 @@ class MemoryJob {
   void measure(const Cloud& cloud, const Edited& edited, const PlayedSteps& played) {
     const Points& result = played.steps.back().result;
     const std::vector<std::uint32_t>& ids = edited.sampling->cloud->id;
-    const std::size_t kept = std::min(cloud.size(), ids.size());
     // What was there before comes first, in its order; what was collected is missing.
     std::vector<std::uint32_t> place(cloud.size(), kNoParent);
     const std::size_t uploaded = edited.sampling->next_id;
     std::vector<std::uint32_t> by_id(uploaded, kNoParent);
     for (std::size_t i = 0; i < ids.size(); ++i) by_id[ids[i]] = static_cast<std::uint32_t>(i);
     for (std::size_t i = 0; i < cloud.size(); ++i) place[i] = by_id[cloud.id[i]];
-    report_.inserted = ids.size() - kept;
+    report_.removed = static_cast<std::uint64_t>(std::ranges::count(place, kNoParent));
+    report_.inserted = ids.size() + report_.removed - cloud.size();
     for (std::size_t i = 0; i < cloud.size(); ++i)
       if (place[i] != kNoParent && edited.finest.position[place[i]] != cloud.position[i]) ++report_.moved;
     const KdTree tree(cloud.position);
@@ -160,6 +158,7 @@ class MemoryJob {
       if (place[i] == kNoParent ||
           std::sqrt(static_cast<double>(found.front().distance_sq)) > report_.spacing)
         continue;
+      if (!result[a].allFinite()) continue;
       const Vec3f here = edited.finest.position[place[i]] - cloud.position[i];
       differences.add(static_cast<double>((here - (result[a] - played.rest[a])).norm()));
     }

@@ -20,7 +20,7 @@ class Team;
 
 enum class JobMode {
   kTiles,   ///< binary PLY and LAS: in tiles, in bounded memory, whatever the size
-  kMemory,  ///< every format, and with resampling: the whole scan at once
+  kMemory,  ///< every format: the whole scan at once
   kDirect,  ///< the same, on levels of the scan's own at full resolution, with the preview's regions
 };
 
@@ -56,7 +56,8 @@ struct JobReport {
   JobMode mode = JobMode::kTiles;
   std::uint64_t samples = 0;
   std::uint64_t moved = 0;     ///< samples that came out otherwise than they went in
-  std::uint64_t inserted = 0;  ///< by resampling
+  std::uint64_t inserted = 0;  ///< by resampling, and still there in the end
+  std::uint64_t removed = 0;   ///< of the scan's samples, by collection
   std::uint64_t tiles = 0;
   std::uint64_t tiles_kept = 0;  ///< of those, done before by a job that was interrupted
   std::uint64_t preview_samples = 0;

@@ -24,9 +24,14 @@ constexpr double kUsualSecondsPerSample = 2e-6;
 /// Reading, cutting and writing come on top of the edits.
 constexpr double kSecondsPerByte = 4e-9;
 
-/// What the recipe takes on each sample, timed on the preview itself.
-Outcome<double> seconds_per_sample(const JobParams& params, const ExecutionContext& context) {
-  if (params.preview == nullptr) return kUsualSecondsPerSample;
+/// What a recipe does to each sample.
+struct Rate {
+  double seconds = kUsualSecondsPerSample;
+  double inserted = 0.0;
+};
+/// Timed on the preview itself; inserted samples count in the time of those that they come from.
+Outcome<Rate> rate_of(const JobParams& params, const ExecutionContext& context) {
+  if (params.preview == nullptr) return Rate();
   const auto levels = hierarchy_for(params.request.recipe, *params.preview, params.neighbors);
   if (!levels.ok()) return levels.problem();
   const auto played = play_on_preview(params.request, params.preview, levels.value(), context);
@@ -36,7 +41,9 @@ Outcome<double> seconds_per_sample(const JobParams& params, const ExecutionConte
   const auto made = transfer_edits(played.value().script, anchors, params.preview, context);
   if (!made) return protocol::to_problem(made.error());
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  return took.count() / static_cast<double>(params.preview->size());
+  const auto each = static_cast<double>(params.preview->size());
+  return Rate{.seconds = took.count() / each,
+              .inserted = static_cast<double>(played.value().inserted) / each};
 }
 
 /// Where the folder will be: the nearest one above it that is there.
@@ -56,21 +63,28 @@ Outcome<JobEstimate> estimate_full_resolution(const JobParams& params, const Exe
   std::error_code none;
   const std::uint64_t bytes = std::filesystem::file_size(params.input, none);
   const std::uint64_t clouds = params.steps.value_or(1);
+  const auto rate = rate_of(params, context);
+  if (!rate.ok()) return rate.problem();
+  const auto grown = [&](std::uint64_t amount) {
+    return static_cast<std::uint64_t>((1.0 + rate.value().inserted) * static_cast<double>(amount));
+  };
   if (chosen.value().records) {
     estimate.samples = chosen.value().records->count;
     estimate.memory_bytes = params.memory_bytes;
-    estimate.disk_bytes = (1 + clouds) * sizeof(TileSample) * estimate.samples + clouds * bytes;
+    // The records of inserted samples stand in their tiles' files first.
+    estimate.disk_bytes =
+        (1 + clouds) * sizeof(TileSample) * estimate.samples + clouds * (2 * grown(bytes) - bytes);
   } else {
     const auto scan = read_scan(params);
     if (!scan) return protocol::to_problem(scan.error());
     estimate.samples = scan.value().cloud.size();
-    estimate.memory_bytes = memory_of(scan.value().cloud) + estimate.samples * kWorkingBytes;
-    estimate.disk_bytes = clouds * memory_of(scan.value().cloud);
+    const std::uint64_t columns = memory_of(scan.value().cloud);
+    estimate.memory_bytes = grown(columns + estimate.samples * kWorkingBytes);
+    estimate.disk_bytes = clouds * grown(columns);
   }
-  const auto each = seconds_per_sample(params, context);
-  if (!each.ok()) return each.problem();
-  estimate.seconds = static_cast<double>(clouds) * (each.value() * static_cast<double>(estimate.samples) +
-                                                    kSecondsPerByte * static_cast<double>(bytes));
+  estimate.seconds =
+      static_cast<double>(clouds) * (rate.value().seconds * static_cast<double>(estimate.samples) +
+                                     kSecondsPerByte * static_cast<double>(bytes));
   const auto space = std::filesystem::space(place_of(params.folder), none);
   if (!none) estimate.free_disk_bytes = space.available;
   return estimate;

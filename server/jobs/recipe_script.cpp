@@ -1,8 +1,10 @@
 #include "server/jobs/recipe_script.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -113,7 +115,7 @@ class Player {
 
   /// The edits and the preview's samples as play() left them.
   PlayedSteps::Step step() {
-    return {.edits = std::exchange(script_.edits, {}), .result = made_.surface->finest().position};
+    return {.edits = std::exchange(script_.edits, {}), .result = own_samples(), .families = families()};
   }
   EditScript script() { return std::move(script_); }
 
@@ -125,6 +127,32 @@ class Player {
   }
 
  private:
+  /// PlayedSteps::Step::result
+  [[nodiscard]] Points own_samples() const {
+    const Points& position = made_.surface->finest().position;
+    const Cloud& now = *made_.samples->sampling->cloud;
+    if (made_.samples->sampling->parent.empty() && now.size() == cloud_->size()) return position;
+    std::unordered_map<std::uint32_t, std::size_t> place;  // by id
+    for (std::size_t i = 0; i < now.size(); ++i) place.emplace(now.id[i], i);
+    Points own(cloud_->size());
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      const auto found = place.find(cloud_->id[i]);
+      own.set(i, found == place.end() ? Vec3f(Vec3f::Constant(std::numeric_limits<float>::quiet_NaN()))
+                                      : position[found->second]);
+    }
+    return own;
+  }
+  /// PlayedSteps::Step::families
+  [[nodiscard]] std::vector<std::uint32_t> families() const {
+    const Sampling& sampling = *made_.samples->sampling;
+    if (sampling.parent.empty()) return {};
+    std::unordered_map<std::uint32_t, std::size_t> place;  // in the preview, by id
+    for (std::size_t i = 0; i < cloud_->size(); ++i) place.emplace(cloud_->id[i], i);
+    std::vector<std::uint32_t> families(cloud_->size(), 0);
+    for (const std::uint32_t root : roots_of(sampling)) ++families[place.at(root)];
+    return families;
+  }
+
   std::optional<Problem> paint(std::size_t index, const RecipeEdit& edit) {
     auto painted = painted_for(limits_, whole_, index, edit, context_);
     if (!painted.ok()) return painted.problem();

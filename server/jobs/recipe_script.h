@@ -41,7 +41,9 @@ Outcome<PlayedRecipe> play_on_preview(const protocol::RecipeRequest& request,
 struct PlayedSteps {
   struct Step {
     std::vector<TransferredEdit> edits;
-    Points result;  ///< the preview's own samples
+    Points result;  ///< the preview's own samples; NaN where one was collected
+    /// How many samples each of these has become, itself included; empty where no edit resamples.
+    std::vector<std::uint32_t> families;
   };
   EditScript script;  ///< without edits
   Points rest;        ///< the preview's own samples

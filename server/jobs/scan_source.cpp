@@ -99,9 +99,6 @@ Outcome<ChosenMode> choose_mode(const JobParams& params) {
   const bool splits = resamples(params.request);
   if (params.mode && *params.mode != JobMode::kTiles)
     return ChosenMode{.mode = *params.mode, .file = {}, .records = {}};
-  if (splits && params.mode)
-    return invalid("edits with resampling are not made in tiles: use the mode memory or direct");
-  if (splits) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
   auto file = MappedFile::open(params.input);
   if (!file) return protocol::to_problem(file.error());
   auto records = ScanRecords::of(file.value().bytes());
@@ -109,6 +106,14 @@ Outcome<ChosenMode> choose_mode(const JobParams& params) {
   const auto wanted = format_of_name(params.output);
   if (!wanted) return protocol::to_problem(wanted.error());
   const bool fits = records.value().has_value() && records.value()->format == wanted.value();
+  if (fits && splits && !records.value()->can_grow()) {
+    if (params.mode)
+      return invalid(
+          "the file holds faces or other elements, which count its samples: with resampling use the mode "
+          "memory or "
+          "direct, which leave them out");
+    return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
+  }
   if (fits)
     return ChosenMode{.mode = JobMode::kTiles, .file = std::move(file).value(), .records = *records.value()};
   if (!params.mode) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <span>
 #include <system_error>
@@ -26,7 +27,22 @@ namespace {
 constexpr std::uint64_t kChunkSamples = std::uint64_t{1} << 21U;  // that are sorted together
 constexpr std::size_t kChunksAtOnce = 2;
 constexpr std::uint64_t kIndexMagic = 0x32584449'54575054ULL;
-constexpr std::uint64_t kResultMagic = 0x31534552'54575054ULL;
+constexpr std::uint64_t kResultMagic = 0x32534552'54575054ULL;
+/// What a tile's result begins with; its parts follow in this order, then the inserted samples' records.
+struct ResultHead {
+  std::uint64_t magic = kResultMagic;
+  std::uint64_t moved = 0;
+  std::uint64_t removed = 0;
+  std::uint64_t inserted = 0;
+  std::uint64_t counts = 0;
+  std::uint64_t matches = 0;
+  /// Of the parts without the records. Pre: each count is less than 2^58
+  [[nodiscard]] std::uint64_t bytes() const {
+    return moved * sizeof(TileSample) + (removed + inserted + counts) * sizeof(std::uint64_t) +
+           matches * sizeof(PreviewMatch);
+  }
+};
+
 constexpr std::size_t kProbes = 64;  // blocks of samples whose neighbourhoods say how wide a ring is
 
 Descriptor opened(const std::string& path, int flags) {
@@ -301,7 +317,8 @@ Result<std::vector<TileSample>> TileStore::read_around(
 }
 
 Result<TileInput> TileStore::load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
-                                  float least_ring, bool has_normals) const {
+                                  float least_ring, bool has_normals,
+                                  const std::optional<Box3f>& scan) const {
   std::size_t own_count = 0;
   const auto read = read_around(tile, [&](std::span<const TileSample> own_samples) {
     own_count = own_samples.size();
@@ -327,9 +344,14 @@ Result<TileInput> TileStore::load(std::size_t tile, std::uint32_t rings, std::ui
     order[i] = static_cast<std::uint32_t>(i);
   });
   sort_by_key(keys, order);
-  Points position(count);
+  Points position(count + (scan ? 2 : 0));
   for_each(count, [&](std::size_t i) { position.set(i, place_of(samples[order[i]])); });
-  const std::vector<std::uint32_t> coherent = coherent_order(position);
+  if (scan) {
+    position.set(count, scan->min);
+    position.set(count + 1, scan->max);
+  }
+  std::vector<std::uint32_t> coherent = coherent_order(position);
+  if (scan) std::erase_if(coherent, [count](std::uint32_t i) { return i >= count; });
   TileInput input;
   auto cloud = std::make_shared<Cloud>();
   cloud->origin = origin_;
@@ -342,7 +364,7 @@ Result<TileInput> TileStore::load(std::size_t tile, std::uint32_t rings, std::ui
     const TileSample& sample = samples[order[coherent[i]]];
     cloud->position.set(i, place_of(sample));
     if (has_normals) cloud->normal.set(i, {sample.normal[0], sample.normal[1], sample.normal[2]});
-    cloud->id[i] = static_cast<std::uint32_t>(i);
+    cloud->id[i] = coherent[i];
     input.index[i] = sample.index;
     place[coherent[i]] = static_cast<std::uint32_t>(i);
   });
@@ -364,29 +386,53 @@ bool TileStore::has_result(std::size_t tile, std::size_t step) const {
 
 Result<void> TileStore::put_result(std::size_t tile, std::size_t step, const TileResult& result) const {
   std::vector<std::byte> bytes;
-  bytes.reserve(24 + result.moved.size() * sizeof(TileSample) + result.matches.size() * sizeof(PreviewMatch));
-  const std::array<std::uint64_t, 3> head{kResultMagic, result.moved.size(), result.matches.size()};
-  append_raw(bytes, head.data(), head.size());
+  const ResultHead head{.moved = result.moved.size(),
+                        .removed = result.removed.size(),
+                        .inserted = result.roots.size(),
+                        .counts = result.counts.size(),
+                        .matches = result.matches.size()};
+  bytes.reserve(sizeof head + head.bytes() + result.records.size());
+  append_raw(bytes, &head, 1);
   append_raw(bytes, result.moved.data(), result.moved.size());
+  append_raw(bytes, result.removed.data(), result.removed.size());
+  append_raw(bytes, result.roots.data(), result.roots.size());
+  append_raw(bytes, result.counts.data(), result.counts.size());
   append_raw(bytes, result.matches.data(), result.matches.size());
+  append_raw(bytes, result.records.data(), result.records.size());
   return write_file_atomically(result_path(tile, step), bytes);
 }
 
 Result<TileResultView> view_result(std::span<const std::byte> bytes) {
-  std::array<std::uint64_t, 3> head{};
+  ResultHead head;
   const Error malformed{
       .code = ErrorCode::kMalformedData, .message = "a tile's result is not whole", .field = "path"};
   if (bytes.size() < sizeof head) return malformed;
-  std::memcpy(head.data(), bytes.data(), sizeof head);
-  const std::uint64_t room = bytes.size() - sizeof head;
-  if (head[0] != kResultMagic || head[1] > room / sizeof(TileSample) ||
-      head[2] != (room - head[1] * sizeof(TileSample)) / sizeof(PreviewMatch))
+  std::memcpy(&head, bytes.data(), sizeof head);
+  bytes = bytes.subspan(sizeof head);
+  const std::uint64_t most = bytes.size();  // no count is more than that
+  if (head.magic != kResultMagic || head.moved > most || head.removed > most || head.inserted > most ||
+      head.counts > most || head.matches > most || head.bytes() > most)
     return malformed;
-  const std::byte* const moved = bytes.data() + sizeof head;
-  const std::byte* const matches = moved + head[1] * sizeof(TileSample);
-  return TileResultView{
-      .moved = {reinterpret_cast<const TileSample*>(moved), static_cast<std::size_t>(head[1])},
-      .matches = {reinterpret_cast<const PreviewMatch*>(matches), static_cast<std::size_t>(head[2])}};
+  const std::uint64_t records = most - head.bytes();
+  if (head.inserted == 0 ? records > 0 : records % head.inserted != 0) return malformed;
+  const auto take = [&]<typename T>(std::uint64_t count, T) {
+    const auto taken = bytes.first(static_cast<std::size_t>(count) * sizeof(T));
+    bytes = bytes.subspan(taken.size());
+    return std::span(reinterpret_cast<const T*>(taken.data()), static_cast<std::size_t>(count));
+  };
+  TileResultView view;
+  view.moved = take(head.moved, TileSample());
+  view.removed = take(head.removed, std::uint64_t{});
+  view.roots = take(head.inserted, std::uint64_t{});
+  view.counts = take(head.counts, std::uint64_t{});
+  view.matches = take(head.matches, PreviewMatch());
+  view.records = bytes;
+  // No scratch file is trusted to be what it was.
+  const auto ascends = [](std::span<const std::uint64_t> numbers, auto in_order) {
+    return std::ranges::adjacent_find(numbers, std::not_fn(in_order)) == numbers.end();
+  };
+  if (!ascends(view.removed, std::less<>()) || !ascends(view.roots, std::less_equal<>())) return malformed;
+  return view;
 }
 
 }  // namespace pointwright::server

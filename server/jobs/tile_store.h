@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -38,13 +39,20 @@ static_assert(sizeof(PreviewMatch) == 12);
 
 /// What the edits made of one tile.
 struct TileResult {
-  std::vector<TileSample> moved;      ///< samples that came out otherwise than they went in, by index
+  std::vector<TileSample> moved;       ///< samples that came out otherwise than they went in, by index
+  std::vector<std::uint64_t> removed;  ///< samples that were collected, ascending
+  /// Of each inserted sample the one that it descends from, ascending; and their records, one after another.
+  std::vector<std::uint64_t> roots;
+  std::vector<std::byte> records;
   std::vector<PreviewMatch> matches;  ///< by anchor
+  /// After each edit whose number of samples has a limit: the tile's own and those that descend from them.
+  std::vector<std::uint64_t> counts;
 };
 
 /// The samples that one tile's work needs.
 struct TileInput {
-  std::shared_ptr<const Cloud> cloud;   ///< own samples and those around them, in coherent order
+  /// Own samples and those around them, in coherent order; ids are in the order of the scan.
+  std::shared_ptr<Cloud> cloud;
   std::vector<std::uint64_t> index;     ///< in the scan, of each
   std::vector<std::uint32_t> by_index;  ///< the tile's own samples, in the scan's order
 };
@@ -75,9 +83,11 @@ class TileStore {
   [[nodiscard]] std::uint64_t sample_count(std::size_t tile) const;  ///< once sorted
 
   /// The tile's samples and those of other tiles within `rings` neighbourhoods of `neighbors` samples around
-  /// them; a neighbourhood reaches at least as far as `least_ring`. Errors: kInvalidArgument (cannot be read)
+  /// them; a neighbourhood reaches at least as far as `least_ring`. Of a whole scan's box, where one is given,
+  /// two samples have the same order in every tile. Errors: kInvalidArgument (cannot be read)
   [[nodiscard]] Result<TileInput> load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
-                                       float least_ring, bool has_normals) const;
+                                       float least_ring, bool has_normals,
+                                       const std::optional<Box3f>& scan = std::nullopt) const;
 
   /// Of one step of an animation; a plain job has step 0 alone.
   [[nodiscard]] bool has_result(std::size_t tile, std::size_t step) const;
@@ -108,7 +118,11 @@ class TileStore {
 /// A tile's result as its file has it; views, valid while the bytes are.
 struct TileResultView {
   std::span<const TileSample> moved;
+  std::span<const std::uint64_t> removed;
+  std::span<const std::uint64_t> roots;
+  std::span<const std::uint64_t> counts;
   std::span<const PreviewMatch> matches;
+  std::span<const std::byte> records;
 };
 /// Error: kMalformedData
 Result<TileResultView> view_result(std::span<const std::byte> bytes);

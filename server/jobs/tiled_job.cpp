@@ -31,6 +31,8 @@
 #include "server/jobs/recipe_script.h"
 #include "server/jobs/result_writer.h"
 #include "server/jobs/scan_survey.h"
+#include "server/jobs/tile_fates.h"
+#include "server/jobs/tile_plan.h"
 #include "server/jobs/tile_store.h"
 
 namespace pointwright::server {
@@ -39,31 +41,10 @@ namespace {
 using protocol::Problem;
 using protocol::ProblemKind;
 
-/// What a tile's samples and those around them take while they are edited, for each band and for all.
-constexpr std::uint64_t kBytesOfSample = 360;
-constexpr std::uint64_t kBytesOfBand = 90;
-/// Of the memory, what preview, buffers and the program itself may take.
-constexpr double kShareOfTiles = 0.8;
-/// Tiles that are edited side by side, whatever the number of threads: their size must not depend on it.
-constexpr std::size_t kTilesAtOnce = 2;
-/// Samples around a tile, by its own: a guess that the share above leaves room for.
-constexpr double kAround = 1.5;
 /// What is read around a tile is whole cells of its neighbours.
 constexpr std::size_t kCellsOfTile = 16;
 constexpr std::uint64_t kCandidates = 5;  // for each sample of the preview
 constexpr std::uint64_t kLeastSurveyed = 200'000;
-
-/// Neighbourhoods around a sample that its own outcome depends on.
-std::uint32_t rings_of(const PlayedSteps& played) {
-  const auto bands = static_cast<std::uint32_t>(played.script.bases.bands.size());
-  std::uint32_t most = 1;
-  for (const PlayedSteps::Step& step : played.steps) {
-    std::uint32_t rings = 1;
-    for (const TransferredEdit& edit : step.edits) rings += bands - edit.params.level + 1;
-    most = std::max(most, rings);
-  }
-  return most;
-}
 
 class TiledJob {
  public:
@@ -80,8 +61,8 @@ class TiledJob {
   Outcome<JobReport> run() {
     report_.samples = records_.count;
     if (auto problem = team_.agree(look())) return *problem;
-    if (auto problem = team_.agree(check_disk())) return *problem;
     if (auto problem = team_.agree(play())) return *problem;
+    if (auto problem = team_.agree(check_disk())) return *problem;
     if (auto problem = sort()) return *problem;
     if (auto problem = team_.agree(edit_tiles())) return *problem;
     sum_tiles_kept();
@@ -145,9 +126,12 @@ class TiledJob {
         const std::uint64_t size = entry.file_size(gone);
         if (!gone) kept += size;
       }
-    const std::uint64_t all = (1 + outputs_.size()) * sizeof(TileSample) * records_.count;
+    // As many samples as the preview says; each inserted one is a record and the number of its root.
+    const std::uint64_t inserted = inserted_by_preview();
+    const std::uint64_t all = (1 + outputs_.size()) * sizeof(TileSample) * records_.count +
+                              outputs_.size() * inserted * (sizeof(std::uint64_t) + records_.record_bytes);
     const std::uint64_t scratch = all - std::min(all, kept);
-    const std::uint64_t output = outputs_.size() * file_.bytes().size();
+    const std::uint64_t output = outputs_.size() * (file_.bytes().size() + inserted * records_.record_bytes);
     const std::string beside = std::filesystem::path(params_.output).parent_path().string();
     const Place here = place_of(params_.folder);
     const Place there = place_of(beside.empty() ? "." : beside);
@@ -159,6 +143,19 @@ class TiledJob {
                              " MiB for its result",
                    .limit = static_cast<double>(std::min(here.free, there.free)),
                    .actual = static_cast<double>(scratch + output)};
+  }
+
+  /// Samples that the scan will have more, as far as the preview tells.
+  [[nodiscard]] std::uint64_t inserted_by_preview() const {
+    double most = 0.0;
+    for (const PlayedSteps::Step& step : played_.steps) {
+      double more = 0.0;
+      for (const std::uint32_t family : step.families)
+        more += std::max(0.0, static_cast<double>(family) - 1.0);
+      most = std::max(most, more);
+    }
+    return static_cast<std::uint64_t>(most / static_cast<double>(preview_->size()) *
+                                      static_cast<double>(records_.count));
   }
 
   std::optional<Problem> play() {
@@ -181,11 +178,21 @@ class TiledJob {
         1.0, std::sqrt(static_cast<double>(preview_->size()) / static_cast<double>(records_.count))));
     report_.spacing = static_cast<double>(script.bases.spacing * script.spacing_ratio);
     rings_ = rings_of(played_);
+    resamples_ = resamples(played_);
+    auto plan =
+        plan_tiles(played_, records_.count + inserted_by_preview(), params_.neighbors, params_.memory_bytes);
+    if (!plan.ok()) return plan.problem();
+    plan_ = plan.value();
+    // The same two samples have the same order in every tile: of two in one place one is collected.
+    const Vec3d& origin = script.origin;
+    if (resamples_)
+      scan_box_ = Box3f{.min = Vec3d(surveyed_.min - origin).cast<float>(),
+                        .max = Vec3d(surveyed_.max - origin).cast<float>()};
     return std::nullopt;
   }
 
   /// What a folder's files belong to.
-  [[nodiscard]] std::string identity(std::uint64_t most) const {
+  [[nodiscard]] std::string identity() const {
     Digest hash(Digest::Algorithm::kSha256);
     const auto add = [&](const void* data, std::size_t size) {
       hash.add(std::span(static_cast<const std::byte*>(data), size));
@@ -194,7 +201,7 @@ class TiledJob {
       for (const float* column : {points.x(), points.y(), points.z()})
         add(column, points.size() * sizeof(float));
     };
-    const std::array<std::uint64_t, 5> numbers{records_.count, most, params_.neighbors, rings_,
+    const std::array<std::uint64_t, 5> numbers{records_.count, plan_.most, params_.neighbors, rings_,
                                                outputs_.size()};
     add(numbers.data(), sizeof numbers);
     add(&surveyed_.digest, sizeof surveyed_.digest);
@@ -209,6 +216,14 @@ class TiledJob {
         const std::array<std::uint64_t, 3> head{edit.params.level, edit.regions->zero.size(),
                                                 edit.regions->one.size()};
         add(head.data(), sizeof head);
+        if (const auto& resampling = edit.params.resampling) {
+          const std::array<double, 3> lengths{resampling->bound, resampling->min_spacing,
+                                              resampling->collect};
+          const std::array<std::uint32_t, 3> counts{resampling->sweeps, resampling->max_samples,
+                                                    resampling->shear_aware ? 1U : 0U};
+          add(lengths.data(), sizeof lengths);
+          add(counts.data(), sizeof counts);
+        }
       }
     }
     return to_hex(hash.finish());
@@ -216,24 +231,18 @@ class TiledJob {
 
   std::optional<Problem> sort() {
     progress_("tiles", 0.1);
-    const std::uint64_t bytes_each = kBytesOfSample + kBytesOfBand * played_.script.bases.bands.size();
-    const double room = kShareOfTiles * static_cast<double>(params_.memory_bytes);
-    const auto most = static_cast<std::uint64_t>(
-        std::max(4096.0, room / kAround / static_cast<double>(kTilesAtOnce * bytes_each)));
     const double share = static_cast<double>(candidates_.size()) / static_cast<double>(records_.count);
-    const auto most_candidates = static_cast<std::size_t>(std::max(1.0, share * static_cast<double>(most)));
-    // Candidates may stand about another origin than the preview that was given.
-    Points candidates(candidates_.size());
-    const Vec3d offset = candidates_.origin - played_.script.origin;
-    for (std::size_t i = 0; i < candidates.size(); ++i)
-      candidates.set(i, (candidates_.position[i].cast<double>() + offset).cast<float>());
-    store_.emplace(params_.folder, TileCuts(candidates, most_candidates, most_candidates / kCellsOfTile),
+    const auto most_candidates =
+        static_cast<std::size_t>(std::max(1.0, share * static_cast<double>(plan_.most)));
+    store_.emplace(params_.folder,
+                   TileCuts(weighted_candidates(candidates_, played_, context_), most_candidates,
+                            most_candidates / kCellsOfTile),
                    played_.script.origin);
     candidates_ = {};
     report_.tiles = store_->tile_count();
 
     const std::string marker = params_.folder + "/job.id";
-    const std::string id = identity(most);
+    const std::string id = identity();
     const auto as_bytes_of = [](const std::string& text) {
       return std::as_bytes(std::span(text.data(), text.size()));
     };
@@ -284,7 +293,7 @@ class TiledJob {
     // Of an even scan of the typical spacing h: k samples in a disc of radius h sqrt(k / pi).
     const double per_ring = std::sqrt((static_cast<double>(params_.neighbors) + 0.5) / std::numbers::pi);
     const auto least_ring = static_cast<float>(report_.spacing * per_ring);
-    // Two lanes: what one of them reads, sorts and writes on its own, the other one's loops make up for.
+    // Lanes: what one of them reads, sorts and writes on its own, the other one's loops make up for.
     std::atomic<std::size_t> next{0};
     std::uint64_t done = 0;
     std::optional<Problem> failure;
@@ -309,7 +318,7 @@ class TiledJob {
       return store_->sample_count(tile) > 0;
     };
     parallel_for(
-        kTilesAtOnce,
+        plan_.lanes,
         [&](std::size_t, std::size_t) {
           for (std::size_t tile = next++; tile < store_->tile_count(); tile = next++) {
             if (!team_.takes(tile) || !begin_tile(tile)) continue;
@@ -323,71 +332,61 @@ class TiledJob {
   [[nodiscard]] std::optional<Problem> edit_tile(std::size_t tile, const AnchorIndex& anchors,
                                                  float least_ring) const {
     if (context_.is_cancelled()) return protocol::to_problem(cancelled_error());
-    auto input = store_->load(tile, rings_, params_.neighbors, least_ring, records_.has_normals());
+    auto input = store_->load(tile, rings_, params_.neighbors, least_ring, records_.has_normals(), scan_box_);
     if (!input) return protocol::to_problem(input.error());
+    const TileSource source{.file = file_, .records = records_};
+    if (resamples_) take_record_values(source, input.value());
     auto rest = decompose_samples(played_.script, anchors, input.value().cloud, context_);
     if (!rest) return protocol::to_problem(rest.error());
     for (std::size_t step = 0; step < outputs_.size(); ++step) {
       const bool is_last = step + 1 == outputs_.size();
-      auto made = make_edits(played_.script, played_.steps[step].edits,
-                             is_last ? std::exchange(rest.value(), {}) : rest.value(), context_);
+      std::vector<std::uint64_t> counts;
+      auto made = made_edits(input.value(), played_.steps[step].edits,
+                             is_last ? std::exchange(rest.value(), {}) : rest.value(), counts);
       if (!made) return protocol::to_problem(made.error());
-      const TileResult result = result_of(input.value(), made.value(), played_.steps[step].result);
-      if (auto put = store_->put_result(tile, step, result); !put) return protocol::to_problem(put.error());
+      auto result = result_of(source, input.value(), made.value(), played_.rest, played_.steps[step].result);
+      if (!result) return protocol::to_problem(result.error());
+      result.value().counts = std::move(counts);
+      if (auto put = store_->put_result(tile, step, result.value()); !put)
+        return protocol::to_problem(put.error());
     }
     return std::nullopt;
   }
 
-  [[nodiscard]] TileResult result_of(const TileInput& input, const TransferredSamples& made,
-                                     const Points& shown) const {
-    struct Fate {
-      TileSample sample;
-      float rest_distance = 0.0F;
-      float difference = 0.0F;
-      bool moved = false;
-    };
-    const Level& now = made.surface.finest();
-    const Points& before = input.cloud->position;
-    const Points& normals = input.cloud->normal;
-    std::vector<Fate> fates(input.index.size());
-    parallel_for(fates.size(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const Vec3f p = now.position[i];
-        const Vec3f n = now.normal[i];
-        const std::uint32_t anchor = made.anchor[i];
-        const Vec3f apart = (p - before[i]) - (shown[anchor] - played_.rest[anchor]);
-        fates[i] = {.sample = {.index = input.index[i],
-                               .position = {p.x(), p.y(), p.z()},
-                               .normal = {n.x(), n.y(), n.z()}},
-                    .rest_distance = (before[i] - played_.rest[anchor]).norm(),
-                    .difference = apart.norm(),
-                    // Normals that are no directions stay as they are where the sample does.
-                    .moved = p != before[i] || (records_.has_normals() && turned(normals[i], n))};
-      }
-    });
-    TileResult result;
-    std::vector<std::uint32_t> best(played_.rest.size(), kNoParent);
-    // Own samples alone, in the scan's order: of equally near ones the first counts.
-    for (const std::uint32_t i : input.by_index) {
-      const Fate& fate = fates[i];
-      if (fate.moved) result.moved.push_back(fate.sample);
-      std::uint32_t& nearest = best[made.anchor[i]];
-      if (nearest == kNoParent || fate.rest_distance < fates[nearest].rest_distance) nearest = i;
-    }
-    for (std::uint32_t anchor = 0; anchor < best.size(); ++anchor) {
-      if (best[anchor] == kNoParent) continue;
-      const Fate& fate = fates[best[anchor]];
-      result.matches.push_back(
-          {.anchor = anchor, .rest_distance = fate.rest_distance, .difference = fate.difference});
-    }
-    return result;
+  static bool is_limited(const TransferredEdit& edit) {
+    return edit.params.resampling && edit.params.resampling->max_samples > 0;
   }
 
-  /// Whether an edit has turned the normal: what import makes of a length that is not 1 is no turn.
-  static bool turned(const Vec3f& before, const Vec3f& after) {
-    if (before == after) return false;
-    const float length = before.norm();
-    return !(length > 1e-6F) || !std::isfinite(length) ? false : Vec3f(before / length) != after;
+  /// make_edits(), with TileResult::counts.
+  [[nodiscard]] Result<TransferredSamples> made_edits(const TileInput& input,
+                                                      std::span<const TransferredEdit> edits,
+                                                      TransferredSamples samples,
+                                                      std::vector<std::uint64_t>& counts) const {
+    while (true) {
+      const auto limited = std::ranges::find_if(edits, is_limited);
+      const auto now = static_cast<std::size_t>(limited - edits.begin()) + (limited == edits.end() ? 0U : 1U);
+      auto made = make_edits(played_.script, edits.first(now), std::move(samples), context_);
+      if (!made || limited == edits.end()) return made;
+      counts.push_back(own_count(input, *made.value().sampling));
+      edits = edits.subspan(now);
+      samples = std::move(made).value();
+    }
+  }
+
+  /// Whether the whole scan keeps to the limits of its edits. `counts`: summed over all tiles.
+  [[nodiscard]] std::optional<Problem> check_limits(std::size_t step,
+                                                    const std::vector<std::uint64_t>& counts) const {
+    std::size_t k = 0;
+    for (const TransferredEdit& edit : played_.steps[step].edits) {
+      if (!is_limited(edit) || k == counts.size()) continue;
+      const std::uint64_t count = counts[k++];
+      if (count <= edit.params.resampling->max_samples) continue;
+      return Problem{.kind = ProblemKind::kTooManySamples,
+                     .detail = "an edit would leave more samples than its resampling.max_samples",
+                     .limit = static_cast<double>(edit.params.resampling->max_samples),
+                     .actual = static_cast<double>(count)};
+    }
+    return std::nullopt;
   }
 
   std::optional<Problem> write() {
@@ -399,8 +398,9 @@ class TiledJob {
 
   std::optional<Problem> write(std::size_t step) {
     progress_result(step, 0.0);
-    report_.moved = 0;
-    std::vector<MovedSamples> moved;
+    report_.moved = report_.inserted = report_.removed = 0;
+    std::vector<MadeTile> tiles;
+    std::vector<std::uint64_t> counts;
     std::vector<PreviewMatch> best(played_.rest.size(), {.rest_distance = std::numeric_limits<float>::max()});
     for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
       if (store_->sample_count(tile) == 0) continue;
@@ -408,13 +408,20 @@ class TiledJob {
       if (!file) return protocol::to_problem(file.error());
       auto view = view_result(file.value().bytes());
       if (!view) return protocol::to_problem(view.error());
+      if (view.value().records.size() != view.value().roots.size() * records_.record_bytes)
+        return Problem{.kind = ProblemKind::kInternalError, .detail = "a tile's result has other records"};
+      counts.resize(std::max(counts.size(), view.value().counts.size()));
+      for (std::size_t k = 0; k < view.value().counts.size(); ++k) counts[k] += view.value().counts[k];
       report_.moved += view.value().moved.size();
+      report_.inserted += view.value().roots.size();
+      report_.removed += view.value().removed.size();
       for (const PreviewMatch& match : view.value().matches)
         if (match.anchor < best.size() && match.rest_distance < best[match.anchor].rest_distance)
           best[match.anchor] = match;
       file.value().release(0, file.value().bytes().size());
-      moved.push_back({.file = std::move(file).value(), .samples = view.value().moved});
+      tiles.push_back({.file = std::move(file).value(), .result = view.value()});
     }
+    if (auto problem = check_limits(step, counts)) return problem;
     DifferenceSum differences;  // the last step's stay
     for (const PreviewMatch& match : best)
       if (static_cast<double>(match.rest_distance) <= report_.spacing)
@@ -423,7 +430,7 @@ class TiledJob {
 
     ResultWriter writer(file_, records_, team_, played_.script.origin, context_,
                         [&](double part) { progress_result(step, part); });
-    return writer.write(outputs_[step], moved);
+    return writer.write(outputs_[step], tiles);
   }
 
   void progress_result(std::size_t step, double part) const {
@@ -444,7 +451,10 @@ class TiledJob {
   const std::vector<std::string> outputs_;  // one for each step
   PlayedSteps played_;
   std::uint32_t rings_ = 1;
-  Descriptor lock_;  // on the folder; the leader's
+  TilePlan plan_;
+  bool resamples_ = false;
+  std::optional<Box3f> scan_box_;  // where tiles owe each other more than positions
+  Descriptor lock_;                // on the folder; the leader's
   std::optional<TileStore> store_;
 };
 

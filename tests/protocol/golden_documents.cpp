@@ -109,6 +109,7 @@ JobDocument done_job() {
                      {"sample_count", 257'413'000},
                      {"moved", 31'000'000},
                      {"inserted", 0},
+                     {"removed", 0},
                      {"tiles", 412},
                      {"tiles_kept", 0},
                      {"preview",

@@ -17,9 +17,8 @@
 #include "protocol/json/parse.h"
 #include "server/base/descriptor.h"
 #include "server/ingest/files.h"
-#include "server/jobs/full_resolution.h"
+#include "tests/server/job_folder.h"
 #include "tests/server/synthetic.h"
-#include "tests/server/temporary_folder.h"
 
 using namespace pointwright;
 using namespace pointwright::server;
@@ -27,76 +26,6 @@ using namespace pointwright::test;
 using protocol::ProblemKind;
 
 namespace {
-
-std::string bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-void put(const std::string& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary) << bytes;
-}
-
-void put(const std::string& path, const Cloud& cloud, CloudFormat format = CloudFormat::kPly,
-         const ExportParams& params = {}) {
-  const auto bytes = write_cloud(cloud, format, params);
-  REQUIRE(bytes.ok());
-  REQUIRE(write_file_atomically(path, bytes.value()).ok());
-}
-
-Cloud cloud_of(const std::string& path) {
-  const auto bytes = read_file(path);
-  REQUIRE(bytes.ok());
-  const auto format = detect_format(bytes.value());
-  REQUIRE(format.ok());
-  auto read = read_cloud(bytes.value(), format.value(), {});
-  REQUIRE(read.ok());
-  return in_caller_order(read.value().cloud);
-}
-
-/// Lifts the right of the sheet on level 0, then turns it on level 1; its left stays.
-protocol::RecipeRequest lifting(std::size_t edits = 2) {
-  protocol::RecipeRequest request;
-  request.recipe.level_scales = {0.11, 0.05, 0.0};
-  protocol::RecipeEdit edit{.paints = true, .zero = {left_of(0.3)}, .one = {right_of(0.7)}};
-  edit.edit.deformation.steps = {Translation{.vector = {0.0, 0.05, 0.3}}};
-  if (edits > 0) request.recipe.edits.push_back(edit);
-  edit.edit.level = 1;
-  edit.edit.deformation.steps = {
-      Rotation{.point = Vec3d(0.7, 0.5, 0.3), .axis = {0, 1, 0}, .angle_rad = protocol::to_radians(25.0)}};
-  if (edits > 1) request.recipe.edits.push_back(edit);
-  return request;
-}
-
-struct JobFolder {
-  TemporaryFolder folder;
-  std::string in = folder / "in.ply";
-  std::string out = folder / "out.ply";
-
-  [[nodiscard]] JobParams params(std::size_t edits = 2) const {
-    return {.input = in,
-            .output = out,
-            .folder = folder / "job",
-            .request = lifting(edits),
-            .preview = nullptr,
-            .preview_count = 2500,
-            .neighbors = 10,
-            .memory_bytes = std::uint64_t{1} << 20U,
-            .mode = {}};
-  }
-  JobReport run(const JobParams& params) const {
-    const auto report = run_full_resolution(params, ExecutionContext(), [](const std::string&, double) {});
-    REQUIRE_MESSAGE(report.ok(), (report.ok() ? "" : report.problem().detail));
-    CHECK_FALSE(std::filesystem::exists(params.folder));
-    return report.value();
-  }
-  protocol::Problem refused(const JobParams& params) const {
-    const auto report = run_full_resolution(params, ExecutionContext(), [](const std::string&, double) {});
-    REQUIRE_FALSE(report.ok());
-    CHECK_FALSE(std::filesystem::exists(params.output));
-    return report.problem();
-  }
-};
 
 /// Big-endian, doubles, properties in an odd order and of other types, normals, a face and bytes after it.
 std::string odd_ply(std::size_t side) {
@@ -384,6 +313,7 @@ TEST_CASE(
   const JobFolder job;
   put(job.in, wavy_sheet(100));
   JobParams params = job.params(1);
+  params.mode = JobMode::kMemory;
   params.request.recipe.edits[0].edit.deformation.steps = {Translation{.vector = {1.0, 0.0, 0.0}}};
   params.request.recipe.edits[0].edit.resampling = ResamplingParams{};
   job.run(params);
@@ -464,7 +394,8 @@ TEST_CASE("LAS stays on its grid, and what its numbers cannot say is refused") {
   CHECK(job.refused(params).detail.find("whole numbers") != std::string::npos);
 }
 
-TEST_CASE("other formats and resampling are made in memory, on levels of their own where asked for") {
+TEST_CASE(
+    "other formats are made in memory, resampling there as well, on levels of their own where asked for") {
   const JobFolder job;
   put(job.in, wavy_sheet(100));
   JobParams params = job.params();
@@ -473,6 +404,7 @@ TEST_CASE("other formats and resampling are made in memory, on levels of their o
   CHECK(cloud_of(params.output).size() == 10'000);
 
   params.output = job.out;
+  params.mode = JobMode::kMemory;
   params.request.recipe.edits[0].edit.deformation.steps = {Translation{.vector = {1.0, 0.0, 0.0}}};
   params.request.recipe.edits[0].edit.resampling = ResamplingParams{};
   const JobReport stretched = job.run(params);
@@ -494,11 +426,6 @@ TEST_CASE("jobs refuse what they cannot do, and leave nothing behind") {
   const JobFolder job;
   put(job.in, wavy_sheet(100));
   JobParams params = job.params();
-  params.request.recipe.edits[0].edit.resampling = ResamplingParams{};
-  params.mode = JobMode::kTiles;
-  CHECK(job.refused(params).detail.find("resampling") != std::string::npos);
-
-  params = job.params();
   params.mode = JobMode::kTiles;
   params.input = job.folder / "text.ply";
   put(params.input, wavy_sheet(50), CloudFormat::kPly, {.ascii = true});

@@ -820,7 +820,8 @@ export interface paths {
          * Make edits on a scan at full resolution
          * @description The recipe is played on a preview, and each sample of the scan is decomposed against the preview's own level surfaces: what was
          *     edited on a hundred thousand samples is made on any number of them, with all of their detail. Binary PLY and LAS are edited in
-         *     tiles, in bounded memory and with every other property as it came; other formats, and edits with resampling, as a whole.
+         *     tiles, in bounded memory and with every other property as it came; samples that edits insert follow those of the scan. Other
+         *     formats, and PLY with faces where samples are inserted, are edited as a whole.
          *     A job is a process of its own: it waits for its turn, goes on after a restart, and harms nothing else where it fails. Its
          *     results stay for job_retention_s.
          */
@@ -1362,7 +1363,10 @@ export interface components {
             mode: "tiles" | "memory" | "direct";
             sample_count: components["schemas"]["Count"];
             moved: components["schemas"]["Count"];
+            /** @description By resampling, and still there in the end */
             inserted: components["schemas"]["Count"];
+            /** @description Of the samples of the scan, by collection */
+            removed: components["schemas"]["Count"];
             tiles: components["schemas"]["Count"];
             /** @description Done before, by a worker that was interrupted */
             tiles_kept: components["schemas"]["Count"];

@@ -9,8 +9,8 @@ import { problemCard } from "./problem-card";
 
 const MODES: Record<JobMode | "auto", readonly [string, string]> = {
   auto: ["Automatic", "In tiles where the scan's format allows it, else as a whole in memory."],
-  tiles: ["In tiles", "In bounded memory, for scans of any size: binary PLY and LAS, no resampling."],
-  memory: ["In memory", "The whole scan at once: every format, and edits with resampling."],
+  tiles: ["In tiles", "In bounded memory, for scans of any size: binary PLY and LAS."],
+  memory: ["In memory", "The whole scan at once: every format."],
   direct: ["Direct", "On levels of the scan's own instead of the preview's: takes the most time and memory."],
 };
 const PRIORITIES = [

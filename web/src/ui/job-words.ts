@@ -103,11 +103,12 @@ export function previewError({ preview, spacing }: JobReport): string | undefine
 
 /** A report in sentences. */
 export function reportText(report: JobReport): string[] {
-  const { sample_count: samples, moved, inserted, tiles, tiles_kept: kept } = report;
+  const { sample_count: samples, moved, inserted, removed, tiles, tiles_kept: kept } = report;
   const lines = [
     `${formatCount(moved)} of ${formatCount(samples)} samples moved in ${durationText(report.seconds)}.`,
   ];
   if (inserted > 0) lines.push(`${formatCount(inserted)} samples were inserted.`);
+  if (removed > 0) lines.push(`${formatCount(removed)} samples were removed where they stood too close.`);
   if (kept > 0)
     lines.push(`${formatCount(kept)} of ${formatCount(tiles)} tiles were done before an interruption.`);
   const error = previewError(report);

@@ -31,6 +31,7 @@ const report: JobReport = {
   sample_count: 257_413_000,
   moved: 31_000_000,
   inserted: 0,
+  removed: 0,
   tiles: 412,
   tiles_kept: 0,
   preview: { sample_count: 100_000, matched: 99_871, rms_difference: 0.000125, max_difference: 0.00175 },
@@ -76,7 +77,8 @@ test("a report says what moved, in which time, and how well the preview showed i
     "31,000,000 of 257,413,000 samples moved in 7 min 18 s.",
     "The preview showed it within 0.02 of a spacing, and within 0.28 at its worst sample.",
   ]);
-  const more = reportText({ ...report, inserted: 1200, tiles_kept: 40 });
+  const more = reportText({ ...report, inserted: 1200, removed: 30, tiles_kept: 40 });
+  expect(more).toContain("30 samples were removed where they stood too close.");
   expect(more).toContain("1,200 samples were inserted.");
   expect(more).toContain("40 of 412 tiles were done before an interruption.");
   const exact = { ...report.preview, rms_difference: 0, max_difference: 0 };

@@ -1,0 +1,129 @@
+#include "server/jobs/result_head.h"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "engine/io/las.h"
+#include "engine/io/load.h"
+
+namespace pointwright::server {
+namespace {
+
+// Bytes of a LAS header, "LAS Specification 1.4 - R15".
+constexpr std::size_t kMinorVersionAt = 25;
+constexpr std::size_t kFormatAt = 104;
+constexpr std::size_t kLegacyCountAt = 107;
+constexpr std::size_t kLegacyReturnsAt = 111;
+constexpr std::size_t kLegacyReturns = 5;
+constexpr std::size_t kWaveformsAt = 227;  // from 1.3 on
+constexpr std::size_t kExtendedAt = 235;   // from 1.4 on
+constexpr std::size_t kCountAt = 247;
+constexpr std::size_t kReturnsAt = 255;
+constexpr std::size_t kReturnByte = 14;  // of a record
+constexpr std::uint8_t kFirstModernFormat = 6;
+constexpr std::uint8_t kFormatBits = 0x3f;
+
+template <typename T>
+T at(std::span<const std::byte> head, std::size_t place) {
+  return load<T>(head.data() + place);
+}
+template <typename T>
+void put(std::span<std::byte> head, std::size_t place, T value) {
+  std::memcpy(head.data() + place, &value, sizeof value);
+}
+
+bool is_version_14(std::span<const std::byte> head) {
+  return at<std::uint8_t>(head, kMinorVersionAt) >= 4 && head.size() >= kLasHeader14Bytes;
+}
+
+/// Points of these formats are not counted in the fields that are older than 1.4.
+bool has_legacy_counts(std::span<const std::byte> head) {
+  return !is_version_14(head) || (at<std::uint8_t>(head, kFormatAt) & kFormatBits) < kFirstModernFormat;
+}
+
+std::uint32_t legacy(std::uint64_t count) {
+  return count > std::numeric_limits<std::uint32_t>::max() ? 0U : static_cast<std::uint32_t>(count);
+}
+
+/// Moves what a header says of a place behind the points.
+void move_place(std::span<std::byte> head, std::size_t field, std::uint64_t old_end, std::uint64_t new_end) {
+  const auto place = at<std::uint64_t>(head, field);
+  if (place >= old_end) put(head, field, place - old_end + new_end);
+}
+
+Result<std::vector<std::byte>> las_head(const ScanRecords& records, std::vector<std::byte> head,
+                                        std::uint64_t count) {
+  if (!is_version_14(head) && count > std::numeric_limits<std::uint32_t>::max())
+    return Error{.code = ErrorCode::kTooLarge,
+                 .message = "only LAS 1.4 says more than 4294967295 points",
+                 .field = "resampling.max_samples",
+                 .limit = static_cast<double>(std::numeric_limits<std::uint32_t>::max()),
+                 .actual = static_cast<double>(count)};
+  if (has_legacy_counts(head)) put(std::span(head), kLegacyCountAt, legacy(count));
+  const std::uint64_t new_end = records.begin + count * records.record_bytes;
+  if (at<std::uint8_t>(head, kMinorVersionAt) >= 3 && head.size() >= kExtendedAt)
+    move_place(head, kWaveformsAt, records.end(), new_end);
+  if (is_version_14(head)) {
+    move_place(head, kExtendedAt, records.end(), new_end);
+    put(std::span(head), kCountAt, count);
+  }
+  return head;
+}
+
+/// The header with another number in the line "element vertex <count>".
+Result<std::vector<std::byte>> ply_head(std::span<const std::byte> head, std::uint64_t count) {
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  constexpr std::string_view kBlanks = " \t";
+  for (std::size_t line = 0; line < text.size();) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", line), text.size());
+    std::array<std::string_view, 3> words;
+    std::size_t from = line;
+    for (std::string_view& word : words) {
+      from = std::min(text.find_first_not_of(kBlanks, from), end);
+      const std::size_t to = std::min(text.find_first_of(kBlanks, from), end);
+      word = text.substr(from, to - from);
+      from = to;
+    }
+    if (words[0] == "element" && words[1] == "vertex") {
+      const auto begin = static_cast<std::size_t>(words[2].data() - text.data());
+      std::string made(text.substr(0, begin));
+      made.append(std::to_string(count)).append(text.substr(begin + words[2].size()));
+      const auto bytes = std::as_bytes(std::span(made));
+      return std::vector<std::byte>(bytes.begin(), bytes.end());
+    }
+    line = end + 1;
+  }
+  return Error{
+      .code = ErrorCode::kMalformedData, .message = "the header counts no vertices", .field = "vertex"};
+}
+
+}  // namespace
+
+void add_returns(const ScanRecords& records, std::span<const std::byte> chunk, ReturnCounts& counts) {
+  for (std::size_t byte = 0; byte + records.record_bytes <= chunk.size(); byte += records.record_bytes) {
+    const unsigned number = std::to_integer<unsigned>(chunk[byte + kReturnByte]) & records.return_mask();
+    if (number > 0) ++counts.at(number - 1);
+  }
+}
+
+Result<std::vector<std::byte>> head_of_result(const ScanRecords& records, std::span<const std::byte> scan,
+                                              std::uint64_t count) {
+  const auto before = scan.first(static_cast<std::size_t>(records.begin));
+  if (count == records.count) return std::vector<std::byte>(before.begin(), before.end());
+  if (records.format == CloudFormat::kPly) return ply_head(before, count);
+  return las_head(records, {before.begin(), before.end()}, count);
+}
+
+void set_returns(std::span<std::byte> head, const ReturnCounts& counts) {
+  if (has_legacy_counts(head))
+    for (std::size_t k = 0; k < kLegacyReturns; ++k)
+      put(head, kLegacyReturnsAt + sizeof(std::uint32_t) * k, legacy(counts.at(k)));
+  if (is_version_14(head))
+    for (std::size_t k = 0; k < counts.size(); ++k)
+      put(head, kReturnsAt + sizeof(std::uint64_t) * k, counts.at(k));
+}
+
+}  // namespace pointwright::server

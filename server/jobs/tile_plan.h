@@ -1,0 +1,36 @@
+#pragma once
+// How large tiles are, and how much around each of them its work needs.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/core/cloud.h"
+#include "server/base/outcome.h"
+#include "server/jobs/recipe_script.h"
+
+namespace pointwright::server {
+
+/// Whether any of the edits inserts samples.
+bool resamples(const PlayedSteps& played);
+
+/// Neighbourhoods around a sample that its own outcome depends on.
+std::uint32_t rings_of(const PlayedSteps& played);
+
+struct TilePlan {
+  std::uint64_t most = 0;  ///< samples of a tile
+  std::size_t lanes = 1;   ///< tiles that are edited side by side, whatever the number of threads
+};
+/// Of what memory leaves room for: tiles with all that is around them, two side by side where that makes them
+/// no narrower than an eighth of what is read.
+/// `samples`: of the whole scan, as many as they become; `neighbors`: of a neighbourhood
+/// Problem: out of space, where what an edit of one sample depends on takes more than the memory
+Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, std::uint32_t neighbors,
+                             std::uint64_t memory_bytes);
+
+/// The candidates that tiles are cut by, each as often as it becomes samples: a tile that is stretched holds
+/// fewer of them. About the script's origin.
+Points weighted_candidates(const Cloud& candidates, const PlayedSteps& played,
+                           const ExecutionContext& context);
+
+}  // namespace pointwright::server
