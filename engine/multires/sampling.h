@@ -44,8 +44,8 @@ struct Sampling {
 Sampling rest_sampling(std::shared_ptr<const Cloud> cloud, std::shared_ptr<const NeighborGraph> graph,
                        std::vector<float> spacing);
 
-/// By sample, the id of the uploaded one that it descends from: its own where it was not inserted. That one may
-/// have been collected since.
+/// By sample, the id of the uploaded one that it descends from: its own where it was not inserted. That one
+/// may have been collected since.
 /// Cost: O(N)
 std::vector<std::uint32_t> roots_of(const Sampling& sampling);
 

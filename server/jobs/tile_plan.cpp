@@ -26,19 +26,38 @@ constexpr double kAround = 1.5;
 constexpr double kLeastSamples = 4096.0;
 /// What is read is at most so many times as wide as the tile: else tiles are made one after another.
 constexpr double kWidest = 8.0;
-/// Less than that nobody gives to a program of this size; tests ask for tiny tiles.
+/// No job is refused for what the preview and the program take anyway.
 constexpr std::uint64_t kLeastMemory = std::uint64_t{128} << 20U;
 /// TileStore::load takes rings this much wider than even scans have them.
 constexpr double kRingRoom = 1.25;
 
-/// Of one edit's resampling: its patches and their neighbours; two for each sweep, whose families stand in
-/// rings of 16; rows that are updated; and of its collection, by round. Ten rounds end a squeeze by a
-/// thousand, and no pair is farther apart than one spacing.
+/// Of one edit's resampling: its patches and rows that are updated, and their neighbours; one for each sweep,
+/// whose families stand in rings of 16 (2.3 spacings of an even scan, as wide as a ring here); and of its
+/// collection: ten rounds end a squeeze by a thousand, and who is each other's nearest shows within twice the
+/// distance that is collected.
 std::uint32_t rings_of(const ResamplingParams& params) {
   constexpr std::uint32_t kOfPatches = 6;
-  constexpr std::uint32_t kOfSweep = 2;
-  constexpr std::uint32_t kOfCollection = 14;
-  return kOfPatches + kOfSweep * params.sweeps + (params.collect > 0.0 ? kOfCollection : 0);
+  constexpr std::uint32_t kOfCollection = 8;
+  return kOfPatches + params.sweeps + (params.collect > 0.0 ? kOfCollection : 0);
+}
+
+/// Of the preview's samples, the greatest of all steps.
+std::vector<std::uint32_t> greatest_families(const PlayedSteps& played) {
+  std::vector<std::uint32_t> families(played.rest.size(), 1);
+  for (const PlayedSteps::Step& step : played.steps)
+    for (std::size_t a = 0; a < step.families.size(); ++a)
+      families[a] = std::clamp(step.families[a], families[a], kMostParts);
+  return families;
+}
+
+/// What all but a twentieth of those that become several become at most.
+double usual_family(const PlayedSteps& played) {
+  std::vector<std::uint32_t> families = greatest_families(played);
+  std::erase(families, 1U);
+  if (families.empty()) return 1.0;
+  const auto place = families.begin() + static_cast<std::ptrdiff_t>(families.size() * 19 / 20);
+  std::nth_element(families.begin(), place, families.end());
+  return *place;
 }
 
 }  // namespace
@@ -64,6 +83,13 @@ std::uint32_t rings_of(const PlayedSteps& played) {
   return most;
 }
 
+double TilePlan::weight_of(double family) const {
+  // (sqrt(own) + around)^2 samples are read, and each becomes `family`.
+  const double side = std::sqrt(room / std::max(1.0, family)) - around;
+  const double own = std::max(kLeastSamples, side > 0.0 ? side * side : 0.0);
+  return std::max(1.0, static_cast<double>(most) / own);
+}
+
 Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, std::uint32_t neighbors,
                              std::uint64_t memory_bytes) {
   const std::uint64_t bytes_each = kBytesOfSample + kBytesOfBand * played.script.bases.bands.size() +
@@ -74,17 +100,24 @@ Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, s
   // In spacings: k samples fill a disc of radius sqrt(k / pi).
   const double ring = kRingRoom * std::sqrt((static_cast<double>(neighbors) + 0.5) / std::numbers::pi);
   const double around = 2.0 * ring * static_cast<double>(rings_of(played));
+  const double family = usual_family(played);
   for (const std::size_t lanes : {kLanes, std::size_t{1}}) {
     const double room = samples_in(memory_bytes, lanes);
+    const double widest = std::sqrt(room / family);  // that is read
+    if ((widest - around) * kWidest < widest) continue;
     const double side = std::min(std::sqrt(room / kAround), std::sqrt(room) - around);
-    if (side * kWidest >= std::sqrt(room))
-      return TilePlan{.most = static_cast<std::uint64_t>(std::max(kLeastSamples, side * side)),
-                      .lanes = lanes};
+    return TilePlan{.most = static_cast<std::uint64_t>(std::max(kLeastSamples, side * side)),
+                    .lanes = lanes,
+                    .room = room,
+                    .around = around};
   }
   const double least =
-      std::min(static_cast<double>(samples), std::pow(std::sqrt(kLeastSamples) + around, 2.0));
+      std::min(static_cast<double>(samples), family * std::pow(std::sqrt(kLeastSamples) + around, 2.0));
   if (least <= samples_in(std::max(memory_bytes, kLeastMemory), 1))
-    return TilePlan{.most = static_cast<std::uint64_t>(kLeastSamples), .lanes = 1};
+    return TilePlan{.most = static_cast<std::uint64_t>(kLeastSamples),
+                    .lanes = 1,
+                    .room = samples_in(memory_bytes, 1),
+                    .around = around};
   const double needed = least * static_cast<double>(bytes_each) / kShareOfTiles;
   return Problem{.kind = ProblemKind::kOutOfSpace,
                  .detail = "what a tile's samples depend on around it, by all edits of this recipe, takes " +
@@ -94,7 +127,7 @@ Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, s
                  .actual = std::ceil(needed)};
 }
 
-Points weighted_candidates(const Cloud& candidates, const PlayedSteps& played,
+Points weighted_candidates(const Cloud& candidates, const PlayedSteps& played, const TilePlan& plan,
                            const ExecutionContext& context) {
   // Candidates may stand about another origin than the preview that was given.
   Points position(candidates.size());
@@ -102,18 +135,23 @@ Points weighted_candidates(const Cloud& candidates, const PlayedSteps& played,
   for (std::size_t i = 0; i < position.size(); ++i)
     position.set(i, (candidates.position[i].cast<double>() + offset).cast<float>());
   if (!resamples(played)) return position;
-  std::vector<std::uint32_t> families(played.rest.size(), 1);
-  for (const PlayedSteps::Step& step : played.steps)
-    for (std::size_t a = 0; a < step.families.size(); ++a)
-      families[a] = std::clamp(step.families[a], families[a], kMostParts);
+  const std::vector<std::uint32_t> families = greatest_families(played);
   const std::vector<std::uint32_t> anchors =
       AnchorIndex(played.script.rest).anchors_of(position, Points(), context);
+  // Whole copies: what is left over goes to the next one.
+  std::vector<std::uint32_t> copies(position.size());
+  double owed = 0.0;
   std::size_t count = 0;
-  for (const std::uint32_t anchor : anchors) count += families[anchor];
+  for (std::size_t i = 0; i < copies.size(); ++i) {
+    owed += plan.weight_of(families[anchors[i]]);
+    copies[i] = static_cast<std::uint32_t>(owed);
+    owed -= copies[i];
+    count += copies[i];
+  }
   Points weighted(count);
   std::size_t at = 0;
   for (std::size_t i = 0; i < position.size(); ++i)
-    for (std::uint32_t k = 0; k < families[anchors[i]]; ++k) weighted.set(at++, position[i]);
+    for (std::uint32_t k = 0; k < copies[i]; ++k) weighted.set(at++, position[i]);
   return weighted;
 }
 

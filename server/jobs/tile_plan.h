@@ -20,6 +20,11 @@ std::uint32_t rings_of(const PlayedSteps& played);
 struct TilePlan {
   std::uint64_t most = 0;  ///< samples of a tile
   std::size_t lanes = 1;   ///< tiles that are edited side by side, whatever the number of threads
+  double room = 0.0;       ///< samples that a lane may hold, with those around a tile and those inserted
+  double around = 0.0;     ///< spacings that what is read is wider than a tile
+
+  /// For how many samples of an undisturbed place one counts that becomes so many.
+  [[nodiscard]] double weight_of(double family) const;
 };
 /// Of what memory leaves room for: tiles with all that is around them, two side by side where that makes them
 /// no narrower than an eighth of what is read.
@@ -28,9 +33,9 @@ struct TilePlan {
 Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, std::uint32_t neighbors,
                              std::uint64_t memory_bytes);
 
-/// The candidates that tiles are cut by, each as often as it becomes samples: a tile that is stretched holds
+/// The candidates that tiles are cut by, each as often as it weighs: a tile whose samples become many holds
 /// fewer of them. About the script's origin.
-Points weighted_candidates(const Cloud& candidates, const PlayedSteps& played,
+Points weighted_candidates(const Cloud& candidates, const PlayedSteps& played, const TilePlan& plan,
                            const ExecutionContext& context);
 
 }  // namespace pointwright::server

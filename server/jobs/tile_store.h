@@ -83,8 +83,8 @@ class TileStore {
   [[nodiscard]] std::uint64_t sample_count(std::size_t tile) const;  ///< once sorted
 
   /// The tile's samples and those of other tiles within `rings` neighbourhoods of `neighbors` samples around
-  /// them; a neighbourhood reaches at least as far as `least_ring`. Of a whole scan's box, where one is given,
-  /// two samples have the same order in every tile. Errors: kInvalidArgument (cannot be read)
+  /// them; a neighbourhood reaches at least as far as `least_ring`. Where the whole scan's box is given, two
+  /// samples have the same order in every tile. Errors: kInvalidArgument (cannot be read)
   [[nodiscard]] Result<TileInput> load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,
                                        float least_ring, bool has_normals,
                                        const std::optional<Box3f>& scan = std::nullopt) const;

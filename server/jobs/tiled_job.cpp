@@ -235,7 +235,7 @@ class TiledJob {
     const auto most_candidates =
         static_cast<std::size_t>(std::max(1.0, share * static_cast<double>(plan_.most)));
     store_.emplace(params_.folder,
-                   TileCuts(weighted_candidates(candidates_, played_, context_), most_candidates,
+                   TileCuts(weighted_candidates(candidates_, played_, plan_, context_), most_candidates,
                             most_candidates / kCellsOfTile),
                    played_.script.origin);
     candidates_ = {};

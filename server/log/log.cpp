@@ -85,6 +85,7 @@ Log::Log(const std::string& level, const std::string& file) : sink_(std::make_un
 
 Log::~Log() {
   sink_->logger->flush();
+  sink_->threads.reset();  // writes what is left, and ends: nobody else has the logger then
 }
 
 void Log::write(LogLevel level, const std::string& event, protocol::JsonDocument members) {

@@ -28,10 +28,18 @@ constexpr const char* kRecipe = R"({"format":"pointwright-recipe","version":1,"l
 {"level":1,"blend":"quartic","deformation":{"type":"rotation","axis":{"point":[0.8,0,0],
 "direction":[0,1,0]},"angle_deg":25}}]})";
 
+// Stretches two thirds of it, with samples inserted and collected.
+constexpr const char* kPull = R"({"format":"pointwright-recipe","version":1,"level_scales":[0.16,0.06,0],
+"edits":[{"zero":{"operations":[{"mode":"add","shape":{"type":"box","min":[-3,-3,-3],"max":[-0.5,3,3]}}]},
+"one":{"operations":[{"mode":"add","shape":{"type":"box","min":[0.8,-3,-3],"max":[3,3,3]}}]},
+"level":0,"blend":"quartic","deformation":{"type":"translation","vector":[1.5,0,0.3]},
+"resampling":{"bound":1.5,"collect":0.6}}]})";
+
 struct JobFigures {
   double seconds = 0.0;
   double cpu_seconds = 0.0;  // of all its threads
   double peak_mb = 0.0;      // MiB
+  double made = 0.0;         // samples in the result
 };
 
 double cpu_of_children() {
@@ -45,10 +53,10 @@ double cpu_of_children() {
 
 class JobBench {
  public:
-  explicit JobBench(const std::string& parent)
+  explicit JobBench(const std::string& parent, const char* recipe = kRecipe)
       : folder_(parent + "/pointwright-bench-" + std::to_string(::getpid())) {
     std::filesystem::create_directories(folder_);
-    std::ofstream(folder_ + "/recipe.json") << kRecipe;
+    std::ofstream(folder_ + "/recipe.json") << recipe;
   }
   ~JobBench() {
     std::error_code ignored;
@@ -76,7 +84,9 @@ class JobBench {
     const auto report = nlohmann::json::parse(text);
     return {.seconds = report.at("seconds").get<double>(),
             .cpu_seconds = cpu_of_children() - cpu_before,
-            .peak_mb = report.at("peak_memory_bytes").get<double>() / (1024.0 * 1024.0)};
+            .peak_mb = report.at("peak_memory_bytes").get<double>() / (1024.0 * 1024.0),
+            .made = report.at("sample_count").get<double>() + report.at("inserted").get<double>() -
+                    report.at("removed").get<double>()};
   }
 
  private:
@@ -101,6 +111,18 @@ void bench_jobs(BenchReport& report) {
   const auto n = static_cast<double>(kSamples);
   report.add("job.samples_per_s", "1/s", n, n / seconds[1]);
   report.add("job.rss_mb", "MB", n, peak_mb);
+}
+
+void bench_resampled_job(BenchReport& report) {
+  if (!report.wants("job.resampled")) return;
+  constexpr std::uint64_t kSamples = 5'000'000;
+  const JobBench bench(std::filesystem::temp_directory_path().string(), kPull);
+  bench.scan(kSamples);
+  const JobFigures figures = bench.run();
+  const auto n = static_cast<double>(kSamples);
+  report.add("job.resampled.samples_per_s", "1/s", n, n / figures.seconds);
+  report.add("job.resampled.out_samples", "samples", n, figures.made);
+  report.add("job.resampled.rss_mb", "MB", n, figures.peak_mb);
 }
 
 void bench_job_growth(BenchReport& report, const std::vector<std::uint64_t>& sizes,

@@ -22,6 +22,8 @@ void bench_resampling(BenchReport& report);
 void bench_http(BenchReport& report);
 /// Likewise.
 void bench_jobs(BenchReport& report);
+/// Likewise. A job whose samples become more, and fewer again.
+void bench_resampled_job(BenchReport& report);
 /// Likewise. Jobs on scans of these sizes, ascending, made and removed below `folder`: time and memory.
 void bench_job_growth(BenchReport& report, const std::vector<std::uint64_t>& sizes,
                       const std::string& folder);

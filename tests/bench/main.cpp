@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
 #ifdef POINTWRIGHT_BENCH_HTTP
     pointwright::bench::bench_http(report);
     pointwright::bench::bench_jobs(report);
+    pointwright::bench::bench_resampled_job(report);
 #endif
   });
   if (!report.write_json(out)) {

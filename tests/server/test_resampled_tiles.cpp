@@ -89,11 +89,11 @@ TEST_CASE(
       const std::string expected = bytes_of(job.out);
       const Cloud made = cloud_of(job.out);
       CHECK(made.size() == 48'400 + many.inserted - many.removed);
-      params.memory_bytes = std::uint64_t{400} << 20U;
+      params.memory_bytes = std::uint64_t{1} << 30U;
       const JobReport few = job.run(params);
       CHECK(few.tiles < many.tiles);
       CHECK(bytes_of(job.out) == expected);
-      params.memory_bytes = std::uint64_t{1} << 30U;
+      params.memory_bytes = std::uint64_t{1} << 34U;
       with_threads(3, [&] { CHECK(job.run(params).tiles == 1); });
       CHECK(bytes_of(job.out) == expected);
     }
