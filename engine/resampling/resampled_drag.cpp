@@ -86,7 +86,7 @@ class ResampledDrag::Work {
         shared_block_(static_cast<std::uint32_t>(before_ / kSimdBlock)),
         level_(surface_->levels[params.level]),
         blocks_(moving_blocks(*field_)),
-        plan_(*surface_, *sampling_->graph, params, *field_, nullptr, {.begin = 0, .end = shared_block_}),
+        plan_(*surface_, *sampling_->graph, params, *field_),
         rest_cells_(cells_on_level(*sampling_, level_.normal, blocks_)),
         patches_(level_, *sampling_->graph),
         all_rest_(*surface_),
@@ -172,8 +172,8 @@ class ResampledDrag::Work {
     append_children(inserted, all_graph_);
   }
 
-  // The samples that were there before by the plan that all frames share, the rest by one of this frame: no
-  // row of theirs has a child in it.
+  // The samples that were there before by the plan that all frames share: no row of theirs has a child in it.
+  // Then the children, and once more the block that they begin in, by a plan of this frame.
   EditPlan apply(const EditParams& params, const ExecutionContext* context, MultiresSurface& edited) const {
     if (edited.levels.empty())
       edited = all_rest_;
@@ -220,7 +220,7 @@ class ResampledDrag::Work {
   const std::shared_ptr<const ScaleField> field_;
   const RegionPair regions_;
   const std::size_t before_;          // samples
-  const std::uint32_t shared_block_;  // whole blocks of them: the next one may hold children too
+  const std::uint32_t shared_block_;  // whole blocks of them: children begin in the next one
   const Level& level_;
   const std::vector<std::uint32_t> blocks_;
   const EditPlan plan_;

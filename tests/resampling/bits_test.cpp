@@ -17,8 +17,8 @@ namespace pointwright {
 namespace {
 
 // A sphere with a band, its north raised along the normals.
-test::EditScene raised_sphere(const ResamplingParams& resampling) {
-  const Level base = test::level_of(test::sphere(4'000, 1.0, test::Sampling::kRegular));
+test::EditScene raised_sphere(const ResamplingParams& resampling, std::size_t count = 4'000) {
+  const Level base = test::level_of(test::sphere(count, 1.0, test::Sampling::kRegular));
   const MultiresSurface surface =
       test::one_band(base, [&](std::size_t i) { return 0.02F * std::sin(9.0F * base.position[i].x()); });
   return test::scene_of(
@@ -83,6 +83,13 @@ TEST_CASE("samples that were there before get the bits of an edit without resamp
     scene.field = compute_scale_field(scene.surface.levels[1].position, scene.regions, Blend::kQuartic);
     check_originals(scene, effort);
   }
+}
+
+TEST_CASE("neighbours of the block that inserted samples begin in get their bits, too") {
+  for (const std::size_t count : {4'001U, 4'009U, 4'015U})
+    for (const ResamplingEffort effort : {ResamplingEffort::kExact, ResamplingEffort::kPreview})
+      check_originals(raised_sphere({}, count), effort);
+  check_originals(pulled(61), ResamplingEffort::kExact);
 }
 
 void check_same_bytes(const test::EditScene& scene, ResamplingEffort effort) {
