@@ -14,6 +14,7 @@ namespace {
 
 // Bytes of a LAS header, "LAS Specification 1.4 - R15".
 constexpr std::size_t kMinorVersionAt = 25;
+constexpr std::size_t kHeaderBytesAt = 94;
 constexpr std::size_t kFormatAt = 104;
 constexpr std::size_t kLegacyCountAt = 107;
 constexpr std::size_t kLegacyReturnsAt = 111;
@@ -35,8 +36,12 @@ void put(std::span<std::byte> head, std::size_t place, T value) {
   std::memcpy(head.data() + place, &value, sizeof value);
 }
 
+/// Whether the header, which is followed by other records, goes as far as that version's.
+bool is_version(std::span<const std::byte> head, std::uint8_t minor, std::size_t bytes) {
+  return at<std::uint8_t>(head, kMinorVersionAt) >= minor && at<std::uint16_t>(head, kHeaderBytesAt) >= bytes;
+}
 bool is_version_14(std::span<const std::byte> head) {
-  return at<std::uint8_t>(head, kMinorVersionAt) >= 4 && head.size() >= kLasHeader14Bytes;
+  return is_version(head, 4, kLasHeader14Bytes);
 }
 
 /// Points of these formats are not counted in the fields that are older than 1.4.
@@ -64,8 +69,7 @@ Result<std::vector<std::byte>> las_head(const ScanRecords& records, std::vector<
                  .actual = static_cast<double>(count)};
   if (has_legacy_counts(head)) put(std::span(head), kLegacyCountAt, legacy(count));
   const std::uint64_t new_end = records.begin + count * records.record_bytes;
-  if (at<std::uint8_t>(head, kMinorVersionAt) >= 3 && head.size() >= kExtendedAt)
-    move_place(head, kWaveformsAt, records.end(), new_end);
+  if (is_version(head, 3, kExtendedAt)) move_place(head, kWaveformsAt, records.end(), new_end);
   if (is_version_14(head)) {
     move_place(head, kExtendedAt, records.end(), new_end);
     put(std::span(head), kCountAt, count);
