@@ -117,7 +117,8 @@ TEST_CASE("resampling in tiles and in memory make the same samples") {
   CHECK(tiled.tiles > 4);
   CHECK(tiled.inserted == whole.inserted);
   CHECK(tiled.removed == whole.removed);
-  CHECK(static_cast<double>(tiled.matched) == doctest::Approx(static_cast<double>(whole.matched)).epsilon(0.01));
+  CHECK(static_cast<double>(tiled.matched) ==
+        doctest::Approx(static_cast<double>(whole.matched)).epsilon(0.01));
   CHECK(tiled.rms_difference == doctest::Approx(whole.rms_difference).epsilon(0.02));
   REQUIRE(made.size() == expected.size());
   const auto all = [](const Cloud& cloud) {
