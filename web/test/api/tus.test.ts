@@ -1,3 +1,4 @@
+import { File as NodeFile } from "node:buffer";
 import { describe, expect, it } from "vitest";
 import { ApiClient } from "../../src/api/client";
 import { uploadInPieces } from "../../src/api/tus";
@@ -67,7 +68,9 @@ function memory(): Storage & { all: Map<string, string> } {
   } as unknown as Storage & { all: Map<string, string> };
 }
 
-const file = () => new File([new Uint8Array(2.5 * PIECE)], "ö.las", { lastModified: 5 });
+// Node 18 knows no File by itself.
+const file = () =>
+  new NodeFile([new Uint8Array(2.5 * PIECE)], "ö.las", { lastModified: 5 }) as unknown as File;
 const pause = async () => undefined;
 
 describe("an upload in pieces", () => {
