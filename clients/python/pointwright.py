@@ -967,7 +967,7 @@ class Client:
         upload (its id); on the session's own cloud where neither is given.
 
         preview: beside a recipe, the cloud that was edited, or how many of the scan's samples stand in for it
-        format: of the result: ply, las, draco or xyz; that of the scan where it is not given
+        format: of the result: ply, las, draco, draco-tiles or xyz; that of the scan where it is not given
         steps: of an animation, so many clouds from s = 0 on
         mode: tiles (bounded memory), memory or direct; tiles where that can be, where it is not given
         """
@@ -1035,7 +1035,13 @@ def _path(location: str) -> str:
 
 def _media_type(name: str) -> str:
     extension = name.lower().rsplit(".", 1)[-1]
-    known = {"drc": "model/x-draco", "ply": "application/x-ply", "xyz": "text/plain", "txt": "text/plain"}
+    known = {
+        "drc": "model/x-draco",
+        "ply": "application/x-ply",
+        "txt": "text/plain",
+        "xyz": "text/plain",
+        "zip": "application/zip",
+    }
     return known.get(extension, "application/octet-stream")
 
 

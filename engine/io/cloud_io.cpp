@@ -6,6 +6,7 @@
 #include "engine/io/columns.h"
 #include "engine/io/decoded_cloud.h"
 #include "engine/io/draco_codec.h"
+#include "engine/io/draco_tiles.h"
 #include "engine/io/las.h"
 #include "engine/io/obj.h"
 #include "engine/io/pcd.h"
@@ -29,7 +30,9 @@ constexpr std::array<Signature, 7> kForeign{{
     {"\x1f\x8b", "the bytes are gzip-compressed: send them unpacked"},
     {"\x28\xb5\x2f\xfd", "the bytes are zstd-compressed: send them unpacked"},
     {"BZh", "the bytes are bzip2-compressed: send them unpacked"},
-    {"PK\x03\x04", "the bytes are a zip archive: send the file in it"},
+    {"PK\x03\x04",
+     "the bytes are a zip archive, not one of Draco tiles, whose first file is index.csv: send the file in "
+     "it"},
     {"glTF", "glTF files are not read: convert to PLY or Draco first"},
 }};
 
@@ -52,6 +55,7 @@ Result<CloudFormat> detect_format(std::span<const std::byte> bytes) {
     return CloudFormat::kPly;
   }
   if (text.starts_with("LASF")) return CloudFormat::kLas;
+  if (looks_like_draco_tiles(bytes)) return CloudFormat::kDracoTiles;
   for (const Signature& foreign : kForeign) {
     if (text.starts_with(foreign.start)) return unsupported(foreign.advice);
   }
@@ -73,6 +77,8 @@ std::string_view format_name(CloudFormat format) {
       return "pcd";
     case CloudFormat::kLas:
       return "las";
+    case CloudFormat::kDracoTiles:
+      return "draco-tiles";
     case CloudFormat::kXyz:
       break;
   }
@@ -97,6 +103,8 @@ Result<ImportedCloud> decode_cloud(std::span<const std::byte> bytes, CloudFormat
       return read_pcd(bytes, params);
     case CloudFormat::kLas:
       return read_las(bytes, params);
+    case CloudFormat::kDracoTiles:
+      return read_draco_tiles(bytes, params);
     case CloudFormat::kXyz:
       break;
   }
@@ -128,16 +136,18 @@ Result<std::vector<std::byte>> write_cloud(const Cloud& cloud, CloudFormat forma
   if (quantised && format == CloudFormat::kXyz) {
     return unsupported("XYZ holds no quantised positions");
   }
-  if (quantised && format != CloudFormat::kDraco) {
+  const bool is_draco = format == CloudFormat::kDraco || format == CloudFormat::kDracoTiles;
+  if (quantised && !is_draco) {
     return Error{.code = ErrorCode::kInvalidArgument,
                  .message = "only Draco quantises positions",
                  .field = "draco_position_bits"};
   }
-  if (params.ascii && (format == CloudFormat::kDraco || format == CloudFormat::kLas)) {
+  if (params.ascii && (is_draco || format == CloudFormat::kLas)) {
     const std::string name = format == CloudFormat::kLas ? "LAS" : "Draco";
     return Error{
         .code = ErrorCode::kInvalidArgument, .message = name + " has no text form", .field = "ascii"};
   }
+  if (format == CloudFormat::kDracoTiles) return write_draco_tiles(cloud, params.draco_position_bits);
   const ExportView view(cloud, params.caller_order);
   switch (format) {
     case CloudFormat::kDraco:
@@ -146,6 +156,7 @@ Result<std::vector<std::byte>> write_cloud(const Cloud& cloud, CloudFormat forma
       return write_ply(view, params.ascii);
     case CloudFormat::kLas:
       return write_las(view, params.grid);
+    case CloudFormat::kDracoTiles:
     case CloudFormat::kObj:
     case CloudFormat::kPcd:
     case CloudFormat::kXyz:

@@ -15,15 +15,16 @@
 
 namespace pointwright {
 
-enum class CloudFormat { kDraco, kPly, kXyz, kObj, kPcd, kLas };
-inline constexpr CloudFormat kLastCloudFormat = CloudFormat::kLas;
+enum class CloudFormat { kDraco, kPly, kXyz, kObj, kPcd, kLas, kDracoTiles };
+inline constexpr CloudFormat kLastCloudFormat = CloudFormat::kDracoTiles;
 
-/// By magic bytes ("DRACO", "ply" + line end, "LASF", a PCD header); else text is OBJ where a line starts
-/// with "v" and a number, and XYZ where it starts with numbers.
+/// By magic bytes ("DRACO", "ply" + line end, "LASF", a PCD header, those of a ZIP archive that begins with
+/// the index of Draco tiles); else text is OBJ where a line starts with "v" and a number, and XYZ where it
+/// starts with numbers.
 /// Errors: kUnsupportedFormat, kEmptyCloud for no bytes.
 Result<CloudFormat> detect_format(std::span<const std::byte> bytes);
 
-std::string_view format_name(CloudFormat format);  ///< "draco", "ply", "xyz", "obj", "pcd", "las"
+std::string_view format_name(CloudFormat format);  ///< "draco", …, "draco-tiles"
 /// Whether write_cloud() knows the format: OBJ and PCD are read alone.
 bool is_writable(CloudFormat format);
 
@@ -105,9 +106,9 @@ struct ExportParams {
 
 /// Writes a cloud with all its attributes. PLY: float64 positions where the cloud's were (or where the origin
 /// makes float32 lose bits), original properties, names and types. Draco: sequential, float64 origin in the
-/// metadata. LAS: 1.2 or, where the columns need it, 1.4, on the grid of the params, or on one of decimals
-/// where that holds every position, or on the finest one that 32 bits span; the further columns as extra
-/// bytes.
+/// metadata. Draco tiles: the same in pieces of one archive (draco_tiles.h), always in coherent order. LAS:
+/// 1.2 or, where the columns need it, 1.4, on the grid of the params, or on one of decimals where that holds
+/// every position, or on the finest one that 32 bits span; the further columns as extra bytes.
 /// Errors: kInvalidArgument, kEmptyCloud; kUnsupportedFormat for OBJ, PCD, and XYZ with params it cannot hold
 Result<std::vector<std::byte>> write_cloud(const Cloud& cloud, CloudFormat format,
                                            const ExportParams& params);

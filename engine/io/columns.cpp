@@ -243,4 +243,35 @@ void ExportView::choose_names() {
   }
 }
 
+std::vector<ScalarAttribute> columns_of(const ExportView& view) {
+  const Cloud& cloud = view.cloud();
+  std::vector<ScalarAttribute> columns;
+  const auto add = [&]<typename T>(const std::string& name, T, auto value_of) {
+    std::vector<T> values(view.size());
+    for (std::size_t row = 0; row < view.size(); ++row) values[row] = value_of(view.sample(row));
+    columns.push_back({.name = name, .values = std::move(values)});
+  };
+  constexpr std::array<const char*, 3> kPosition{"x", "y", "z"};
+  constexpr std::array<const char*, 3> kNormal{"nx", "ny", "nz"};
+  constexpr std::array<const char*, 4> kColor{"red", "green", "blue", "alpha"};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    add(kPosition[axis], double{}, [&](std::uint32_t i) { return view.position(i)[axis]; });
+  for (std::size_t axis = 0; axis < 3 && cloud.has_normals(); ++axis)
+    add(kNormal[axis], float{},
+        [&](std::uint32_t i) { return cloud.normal[i][static_cast<Eigen::Index>(axis)]; });
+  const std::size_t channels = !cloud.has_colors() ? 0 : cloud.color_has_alpha ? 4 : 3;
+  for (std::size_t k = 0; k < channels; ++k)
+    add(kColor[k], std::uint8_t{}, [&](std::uint32_t i) { return cloud.color[i][k]; });
+  for (std::size_t k = 0; k < 2 && !cloud.texcoord.empty(); ++k)
+    add(view.texcoord_names()[k], float{}, [&](std::uint32_t i) { return cloud.texcoord[i][k]; });
+  for (std::size_t s = 0; s < cloud.scalars.size(); ++s)
+    std::visit(
+        [&](const auto& values) {
+          using T = typename std::decay_t<decltype(values)>::value_type;
+          add(view.scalar_names()[s], T{}, [&](std::uint32_t i) { return values[i]; });
+        },
+        cloud.scalars[s].values);
+  return columns;
+}
+
 }  // namespace pointwright

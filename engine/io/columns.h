@@ -61,4 +61,8 @@ class ExportView {
   std::vector<std::string> scalar_names_;
 };
 
+/// The inverse of assemble_cloud(): named columns in the order of the view's rows, x, y and z as float64 in
+/// model space first, then those that a writer of PLY would write.
+std::vector<ScalarAttribute> columns_of(const ExportView& view);
+
 }  // namespace pointwright

@@ -55,6 +55,25 @@ Result<PlyHeader> parse_ply_header(std::span<const std::byte> bytes);
 /// Errors: kMalformedData, kUnsupportedFormat, kTooLarge, kEmptyCloud
 Result<ImportedCloud> read_ply(std::span<const std::byte> bytes, const ImportParams& params);
 
+/// Rows and lines of a part of an ASCII file: lines of blanks are no rows.
+struct PlyRowCount {
+  std::uint64_t rows = 0;
+  std::uint64_t lines = 0;
+};
+PlyRowCount count_ply_rows(std::string_view text, char line_end);
+
+/// The next `count` of the vertices' rows of an ASCII file, for files that are read piece by piece: `text`
+/// begins with the first of them, in line `first_line`. The scalar properties in their order; lists are left
+/// out. Errors: kMalformedData (with the line)
+Result<std::vector<ScalarAttribute>> read_ply_rows(std::string_view text, const PlyHeader& header,
+                                                   std::uint64_t count, std::uint64_t first_line);
+
+/// Rows of the vertices of a binary file, as decode_cloud() reads them. Pre: the vertices have no lists
+Result<ImportedCloud> read_ply_vertices(std::span<const std::byte> rows, const PlyHeader& header);
+
+/// The header of a binary little-endian file that holds nothing but vertices with these properties.
+std::string ply_header_text(std::uint64_t count, std::span<const PlyProperty> properties);
+
 /// x y z [nx ny nz] [red green blue [alpha]] [s t] and the scalars in their types.
 std::vector<std::byte> write_ply(const ExportView& view, bool ascii);
 

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 
+#include "engine/core/check.h"
 #include "engine/io/ply.h"
 
 namespace pointwright {
@@ -163,6 +164,10 @@ class BinaryBody {
 
 // ---- ascii ----
 
+bool is_blank_in(char c, char line_end) {
+  return c == ' ' || c == '\t' || c == '\v' || c == '\f' || ((c == '\r' || c == '\n') && c != line_end);
+}
+
 class AsciiBody {
  public:
   AsciiBody(std::string_view text, const PlyHeader& header)
@@ -215,9 +220,7 @@ class AsciiBody {
   }
 
  private:
-  [[nodiscard]] bool is_blank(char c) const {
-    return c == ' ' || c == '\t' || c == '\v' || c == '\f' || ((c == '\r' || c == '\n') && c != line_end_);
-  }
+  [[nodiscard]] bool is_blank(char c) const { return is_blank_in(c, line_end_); }
   void skip_blanks() {
     while (at_ != end_ && is_blank(*at_)) ++at_;
   }
@@ -373,6 +376,40 @@ Result<ImportedCloud> read_ply(std::span<const std::byte> bytes, const ImportPar
   }
   if (!columns) return columns.error();
   return assemble_cloud(std::move(columns).value(), start_report(header));
+}
+
+PlyRowCount count_ply_rows(std::string_view text, char line_end) {
+  PlyRowCount count;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find(line_end));
+    if (!std::ranges::all_of(line, [&](char c) { return is_blank_in(c, line_end); })) ++count.rows;
+    if (line.size() == text.size()) break;
+    ++count.lines;
+    text.remove_prefix(line.size() + 1);
+  }
+  return count;
+}
+
+Result<std::vector<ScalarAttribute>> read_ply_rows(std::string_view text, const PlyHeader& header,
+                                                   std::uint64_t count, std::uint64_t first_line) {
+  POINTWRIGHT_CHECK(header.vertex() != nullptr, "rows of a file without vertices");
+  PlyElement element = *header.vertex();
+  element.count = count;
+  AsciiBody body(text, {.data_offset = 0, .line_count = first_line - 1, .line_end = header.line_end});
+  if (auto fits = body.check_length(element); !fits) return fits.error();
+  Table table = make_table(element);
+  if (auto done = body.read(element, table); !done) return done.error();
+  return std::move(table.columns);
+}
+
+Result<ImportedCloud> read_ply_vertices(std::span<const std::byte> rows, const PlyHeader& header) {
+  POINTWRIGHT_CHECK(header.vertex() != nullptr && !header.vertex()->has_lists(), "rows of one length");
+  PlyElement element = *header.vertex();
+  element.count = rows.size() / element.least_row_bytes();
+  BinaryBody body(rows, 0, header.encoding == PlyEncoding::kBinaryBigEndian);
+  Table table = make_table(element);
+  if (auto done = body.read(element, table); !done) return done.error();
+  return assemble_cloud(std::move(table.columns), start_report(header));
 }
 
 }  // namespace pointwright

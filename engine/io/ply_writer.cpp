@@ -46,13 +46,20 @@ class RowSink {
   std::string row_;
 };
 
+std::string header_text(PlyEncoding encoding, std::uint64_t count, std::span<const PlyProperty> properties) {
+  std::string text = "ply\nformat ";
+  text += encoding_name(encoding);
+  text += " 1.0\ncomment Written by Pointwright\nelement vertex " + std::to_string(count) + "\n";
+  for (const PlyProperty& property : properties)
+    text += "property " + std::string(ply_type(property.type)) + " " + property.name + "\n";
+  return text + "end_header\n";
+}
+
 std::string header_of(const ExportView& view, bool ascii) {
   const Cloud& cloud = view.cloud();
-  std::string text = "ply\nformat ";
-  text += encoding_name(ascii ? PlyEncoding::kAscii : PlyEncoding::kBinaryLittleEndian);
-  text += " 1.0\ncomment Written by Pointwright\nelement vertex " + std::to_string(view.size()) + "\n";
+  std::vector<PlyProperty> properties;
   const auto property = [&](ScalarType type, const std::string& name) {
-    text += "property " + std::string(ply_type(type)) + " " + name + "\n";
+    properties.push_back({.name = name, .type = type});
   };
   for (const char* name : {"x", "y", "z"})
     property(view.needs_double() ? ScalarType::kDouble : ScalarType::kFloat, name);
@@ -68,7 +75,7 @@ std::string header_of(const ExportView& view, bool ascii) {
   }
   for (std::size_t s = 0; s < cloud.scalars.size(); ++s)
     property(type_of(cloud.scalars[s]), view.scalar_names()[s]);
-  return text + "end_header\n";
+  return header_text(ascii ? PlyEncoding::kAscii : PlyEncoding::kBinaryLittleEndian, view.size(), properties);
 }
 
 void put_row(const ExportView& view, std::uint32_t i, RowSink& sink) {
@@ -107,6 +114,10 @@ std::size_t row_bytes(const ExportView& view, bool ascii) {
 }
 
 }  // namespace
+
+std::string ply_header_text(std::uint64_t count, std::span<const PlyProperty> properties) {
+  return header_text(PlyEncoding::kBinaryLittleEndian, count, properties);
+}
 
 std::vector<std::byte> write_ply(const ExportView& view, bool ascii) {
   const std::string header = header_of(view, ascii);

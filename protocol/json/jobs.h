@@ -25,7 +25,7 @@ inline constexpr std::array<std::string_view, 5> kJobStatusNames = {"accepted", 
 /// tiles: bounded memory; memory: the whole scan at once; direct: on levels of its own.
 inline constexpr std::array<std::string_view, 3> kJobModeNames = {"tiles", "memory", "direct"};
 inline constexpr std::array kJobFormats = {CloudFormat::kPly, CloudFormat::kLas, CloudFormat::kDraco,
-                                           CloudFormat::kXyz};
+                                           CloudFormat::kXyz, CloudFormat::kDracoTiles};
 inline constexpr std::uint64_t kHighestPriority = 9;
 inline constexpr std::uint64_t kUsualPriority = 5;
 inline constexpr std::uint64_t kMostSteps = 1000;        ///< of an animation

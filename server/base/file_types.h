@@ -19,6 +19,7 @@ inline constexpr std::array kFileTypes = {
     FileType{CloudFormat::kDraco, "model/x-draco", ".drc"},
     FileType{CloudFormat::kXyz, "text/plain; charset=utf-8", ".xyz"},
     FileType{CloudFormat::kLas, "application/vnd.las", ".las"},
+    FileType{CloudFormat::kDracoTiles, "application/zip", ".zip"},
 };
 
 /// Pre: clouds are written in it.

@@ -60,8 +60,9 @@ bool fits_output(const Options& options, std::ostream& err, int& status) {
     return false;
   }
   const char* complaint = nullptr;
-  if (options.draco_bits != 0 && format.value() != CloudFormat::kDraco)
-    complaint = "--draco-bits is for .drc files";
+  if (options.draco_bits != 0 && format.value() != CloudFormat::kDraco &&
+      format.value() != CloudFormat::kDracoTiles)
+    complaint = "--draco-bits is for .drc and .zip files";
   else if (options.ascii && format.value() != CloudFormat::kPly)
     complaint = "--ascii is for .ply files";
   if (complaint == nullptr) return true;
@@ -196,7 +197,8 @@ int run_command(const std::vector<std::string>& arguments, std::ostream& out, st
   for (CLI::App* const command : {convert_command, smooth_command, simplify_command}) {
     command->add_option("IN", options.input, "Draco, PLY, LAS, PCD, OBJ or XYZ file, gzip-compressed or not")
         ->required();
-    command->add_option("OUT", options.output, ".drc, .ply, .las, .xyz, .txt or .asc")->required();
+    command->add_option("OUT", options.output, ".drc, .ply, .las, .zip (Draco tiles), .xyz, .txt or .asc")
+        ->required();
     command
         ->add_option("--draco-bits", options.draco_bits,
                      "quantise positions to so many bits; lossless without")

@@ -233,18 +233,21 @@ CLI::App* add_job_run(CLI::App& group, JobRunOptions& options) {
   CLI::App* const command =
       group.add_subcommand("run", "make a recipe's edits on a scan at full resolution, here");
   command->add_option("--recipe", options.recipe, "a file with the edits: a session's recipe")->required();
-  command->add_option("--in", options.input, "the scan: Draco, PLY, LAS, PCD, OBJ or XYZ")->required();
-  command->add_option("--out", options.output, "the result: .ply, .las, .drc, .xyz, .txt or .asc")
+  command->add_option("--in", options.input, "the scan: Draco, Draco tiles, PLY, LAS, PCD, OBJ or XYZ")
+      ->required();
+  command
+      ->add_option("--out", options.output,
+                   "the result: .ply, .las, .drc, .zip (Draco tiles), .xyz, .txt or .asc")
       ->required();
   command->add_option("--preview", options.preview, "the cloud that the session edited; else one is made");
   command->add_option("--preview-count", options.preview_count, "samples of a preview that is made")
       ->check(CLI::Range(std::uint64_t{100}, std::uint64_t{20'000'000}))
       ->capture_default_str();
   command
-      ->add_option(
-          "--mode", options.mode,
-          "tiles: bounded memory, binary PLY and LAS; memory: the whole scan at once; direct: on levels "
-          "of its own; else tiles where that can be")
+      ->add_option("--mode", options.mode,
+                   "tiles: bounded memory, PLY, LAS and Draco tiles; memory: the whole scan at once; direct: "
+                   "on levels "
+                   "of its own; else tiles where that can be")
       ->check(CLI::IsMember({"tiles", "memory", "direct"}));
   command->add_option("--s", options.s,
                       "how far the edits are played, 0 to 1; 1 where the file does not say");

@@ -76,9 +76,10 @@ Result<CloudFormat> format_of_name(const std::string& path) {
   if (extension == ".drc") return CloudFormat::kDraco;
   if (extension == ".ply") return CloudFormat::kPly;
   if (extension == ".las") return CloudFormat::kLas;
+  if (extension == ".zip") return CloudFormat::kDracoTiles;
   if (extension == ".xyz" || extension == ".txt" || extension == ".asc") return CloudFormat::kXyz;
   return Error{.code = ErrorCode::kUnsupportedFormat,
-               .message = "\"" + extension + "\" is not .drc, .ply, .las, .xyz, .txt or .asc",
+               .message = "\"" + extension + "\" is not .drc, .ply, .las, .zip, .xyz, .txt or .asc",
                .field = {}};
 }
 

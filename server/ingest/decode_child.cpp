@@ -10,6 +10,7 @@
 #include "engine/io/cloud_blob.h"
 #include "engine/io/decoded_cloud.h"
 #include "engine/io/draco_gate.h"
+#include "engine/io/draco_tiles.h"
 #include "engine/io/pcd.h"
 #include "server/ingest/confined.h"
 #include "server/ingest/exchange_record.h"
@@ -36,6 +37,21 @@ void write_all(std::span<const std::byte> piece) {
   }
 }
 
+// One tile's file, then the columns of all: tile by tile first, then together.
+std::uint64_t memory_for_tiles(std::span<const std::byte> bytes, const ImportParams& params) {
+  std::uint64_t all = 64 * kMiB;
+  auto reader = DracoTilesReader::open(bytes, params.max_samples);
+  if (!reader) return all;
+  while (true) {
+    const auto piece = reader.value().next();
+    if (!piece || !piece.value()) return all;
+    const auto claim = draco_gate(piece.value()->bytes, params.max_samples);
+    if (!claim) return all;
+    all += piece.value()->bytes.size() + claim.value().faces * 256 +
+           claim.value().points * (96 + 8 * claim.value().sample_bytes);
+  }
+}
+
 // What decoding may need beyond the bytes themselves. Scans were measured to take a quarter of it (Draco: 40
 // bytes a sample of 15; text of long numbers: twice its bytes); text of one-digit numbers takes nearly all.
 std::uint64_t memory_for(std::span<const std::byte> bytes, CloudFormat format, const ImportParams& params) {
@@ -46,6 +62,7 @@ std::uint64_t memory_for(std::span<const std::byte> bytes, CloudFormat format, c
     const PcdHeader& h = header.value();
     return 64 * kMiB + 24 * bytes.size() + h.points * (64 + 3 * h.row_bytes());
   }
+  if (format == CloudFormat::kDracoTiles) return memory_for_tiles(bytes, params);
   if (format != CloudFormat::kDraco) return 64 * kMiB + 24 * bytes.size();
   const auto claim = draco_gate(bytes, params.max_samples);
   if (!claim) return 64 * kMiB;

@@ -16,10 +16,13 @@
 #include "engine/spatial/kd_tree.h"
 #include "server/cli/local_file.h"
 #include "server/ingest/files.h"
+#include "server/jobs/packed_result.h"
 #include "server/jobs/recipe_script.h"
 #include "server/jobs/scan_source.h"
+#include "server/jobs/scratch_folder.h"
 #include "server/jobs/team.h"
 #include "server/jobs/tiled_job.h"
+#include "server/jobs/unpacked_scan.h"
 
 namespace pointwright::server {
 namespace {
@@ -171,6 +174,114 @@ class MemoryJob {
   JobReport report_;
 };
 
+/// Tiles, and what comes before and after them where the scan is no records or the result shall be none.
+class TileRun {
+ public:
+  TileRun(const JobParams& params, ChosenMode chosen, Team& team, const ExecutionContext& context,
+          const JobProgress& progress)
+      : params_(params), chosen_(std::move(chosen)), team_(team), context_(context), progress_(progress) {}
+
+  Outcome<JobReport> run() {
+    if (auto problem = folder_.take(params_.folder, team_)) return *problem;
+    if (auto problem = unpack()) return *problem;
+    auto made = run_tiles(
+        params_,
+        {.file = *scan_,
+         .records = *records_,
+         .outputs = made_files(),
+         .is_packed_afterwards = chosen_.packs},
+        team_, context_, part_of_progress(chosen_.packed ? kUnpacking : 0.0, chosen_.packs ? kPacking : 1.0));
+    if (!made.ok()) return made.problem();
+    report_ = std::move(made.value().report);
+    report_.files = outputs_of(params_);
+    if (auto problem = finish(made.value().is_changed)) return *problem;
+    if (team_.leads()) folder_.remove();
+    progress_("done", 1.0);
+    return report_;
+  }
+
+ private:
+  // Where in a job's progress the one ends and the other begins.
+  static constexpr double kUnpacking = 0.1;
+  static constexpr double kPacking = 0.85;
+
+  [[nodiscard]] JobProgress part_of_progress(double begin, double end) const {
+    return [this, begin, end](const std::string& phase, double fraction) {
+      progress_(phase, begin + (end - begin) * fraction);
+    };
+  }
+
+  std::optional<Problem> unpack() {
+    if (!chosen_.packed) {
+      scan_ = &*chosen_.file;
+      records_ = &*chosen_.records;
+      return std::nullopt;
+    }
+    const std::string path = params_.folder + "/" + ScratchFolder::kScanName;
+    if (auto problem = unpack_scan(params_, *chosen_.file, *chosen_.packed, path, team_, context_,
+                                   part_of_progress(0.0, kUnpacking)))
+      return problem;
+    auto file = MappedFile::open(path);
+    auto records =
+        file ? ScanRecords::of(file.value().bytes()) : Result<std::optional<ScanRecords>>(file.error());
+    std::optional<Problem> problem;
+    if (!records)
+      problem = protocol::to_problem(records.error());
+    else if (!records.value())
+      problem = Problem{.kind = ProblemKind::kInternalError, .detail = "the unpacked scan is no records"};
+    if (auto any = team_.agree(problem)) return any;
+    unpacked_file_ = std::move(file).value();
+    unpacked_records_ = std::move(records).value();
+    scan_ = &*unpacked_file_;
+    records_ = &*unpacked_records_;
+    return std::nullopt;
+  }
+
+  /// What the tiles write: the outputs, or what becomes these.
+  [[nodiscard]] std::vector<std::string> made_files() const {
+    if (!chosen_.packs) return outputs_of(params_);
+    JobParams made = params_;
+    made.output = params_.folder + "/" + ScratchFolder::kEditedName;
+    return outputs_of(made);
+  }
+
+  std::optional<Problem> finish(const std::vector<bool>& is_changed) {
+    const std::vector<std::string> made = made_files();
+    // A recipe without effect gives the scan's own bytes, where they are of the format.
+    const bool keeps = chosen_.packed && (chosen_.packed->packing == Packing::kDracoTiles) == chosen_.packs;
+    for (std::size_t k = 0; k < made.size(); ++k) {
+      const std::string& output = report_.files[k];
+      std::optional<Problem> problem;
+      if (keeps && !is_changed[k])
+        problem = team_.agree(team_.leads() ? copy_scan(output) : std::nullopt);
+      else if (chosen_.packs)
+        problem = pack_result(made[k], output, params_.folder + "/tiles.packed", params_.memory_bytes, team_,
+                              context_, part_of_progress(kPacking, 1.0));
+      if (problem) return problem;
+      std::error_code none;
+      if (chosen_.packs && team_.leads()) std::filesystem::remove(made[k], none);
+    }
+    return std::nullopt;
+  }
+
+  [[nodiscard]] std::optional<Problem> copy_scan(const std::string& output) const {
+    const auto copied = write_file_atomically(output, chosen_.file->bytes());
+    return copied ? std::nullopt : std::optional(protocol::to_problem(copied.error()));
+  }
+
+  const JobParams& params_;
+  const ChosenMode chosen_;
+  Team& team_;
+  const ExecutionContext& context_;
+  const JobProgress& progress_;
+  ScratchFolder folder_;
+  std::optional<MappedFile> unpacked_file_;
+  std::optional<ScanRecords> unpacked_records_;
+  const MappedFile* scan_ = nullptr;
+  const ScanRecords* records_ = nullptr;
+  JobReport report_;
+};
+
 }  // namespace
 
 std::vector<std::string> outputs_of(const JobParams& params) {
@@ -195,7 +306,7 @@ Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionC
   if (auto problem = team.agree(chosen.ok() ? std::nullopt : std::optional(chosen.problem())))
     return *problem;
   if (chosen.value().mode == JobMode::kTiles)
-    return run_tiles(params, *chosen.value().file, *chosen.value().records, team, context, progress);
+    return TileRun(params, std::move(chosen.value()), team, context, progress).run();
   Outcome<JobReport> outcome = JobReport();
   if (team.leads()) outcome = MemoryJob(params, chosen.value().mode, context, progress).run();
   if (auto problem = team.agree(outcome.ok() ? std::nullopt : std::optional(outcome.problem())))

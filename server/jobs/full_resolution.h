@@ -19,14 +19,14 @@ namespace pointwright::server {
 class Team;
 
 enum class JobMode {
-  kTiles,   ///< binary PLY and LAS: in tiles, in bounded memory, whatever the size
+  kTiles,   ///< PLY, LAS and Draco tiles: in tiles, in bounded memory, whatever the size
   kMemory,  ///< every format: the whole scan at once
   kDirect,  ///< the same, on levels of the scan's own at full resolution, with the preview's regions
 };
 
 struct JobParams {
   std::string input;
-  std::string output;  ///< its name says the format; in tiles, that of the input
+  std::string output;  ///< its name says the format; in tiles, LAS of LAS, else PLY or Draco tiles
   /// Scratch files, and what a job that was interrupted goes on from; made where it is not there.
   std::string folder;
   protocol::RecipeRequest request;
@@ -94,7 +94,8 @@ using JobProgress = std::function<void(const std::string& phase, double fraction
 /// Problems:    those of reading the input, of play_on_preview and of writing; kCancelled
 /// Promises:    samples that no edit moved keep their bytes; a recipe without effect gives the input's bytes
 /// Cost:        two passes over the input, 32 bytes of disk a sample and, for each cloud that is written, as
-///              many for each that moves
+///              many for each that moves; one pass and the records' bytes more where the input is unpacked
+///              first (ASCII PLY, Draco tiles), three and twice these where the result is packed
 /// Determinism: the same bytes for any number of threads; memory_bytes, which says how large tiles are, may
 ///              change what a tile's neighbours at its border are taken to be
 Outcome<JobReport> run_full_resolution(const JobParams& params, const ExecutionContext& context,

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/jobs/full_resolution.h"
+#include "server/jobs/packed_result.h"
 #include "server/jobs/recipe_script.h"
 #include "server/jobs/scan_source.h"
 #include "server/jobs/tile_store.h"
@@ -68,12 +69,19 @@ Outcome<JobEstimate> estimate_full_resolution(const JobParams& params, const Exe
   const auto grown = [&](std::uint64_t amount) {
     return static_cast<std::uint64_t>((1.0 + rate.value().inserted) * static_cast<double>(amount));
   };
-  if (chosen.value().records) {
-    estimate.samples = chosen.value().records->count;
+  if (chosen.value().mode == JobMode::kTiles) {
+    const std::optional<PackedScan>& packed = chosen.value().packed;
+    estimate.samples = packed ? packed->samples : chosen.value().records->count;
     estimate.memory_bytes = params.memory_bytes;
+    // Draco tiles without loss are about as long as their records.
+    const std::uint64_t unpacked =
+        packed ? (packed->record_bytes ? *packed->record_bytes * packed->samples : bytes) : 0;
+    const std::uint64_t scan = packed ? unpacked : bytes;
     // The records of inserted samples stand in their tiles' files first.
     estimate.disk_bytes =
-        (1 + clouds) * sizeof(TileSample) * estimate.samples + clouds * (2 * grown(bytes) - bytes);
+        unpacked + (1 + clouds) * sizeof(TileSample) * estimate.samples + clouds * (2 * grown(scan) - scan);
+    if (chosen.value().packs)
+      estimate.disk_bytes += packing_bytes(grown(estimate.samples), 0) + (clouds + 2) * grown(scan);
   } else {
     const auto scan = read_scan(params);
     if (!scan) return protocol::to_problem(scan.error());

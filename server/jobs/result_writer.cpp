@@ -112,8 +112,11 @@ Result<void> ResultWriter::write_share(const std::string& path) {
   const auto file = team_.open(path);
   if (file == nullptr) return file_error("cannot write", path, errno);
   const auto done = write_records(*file);
+  const int failure = done && !done.value() ? errno : 0;
+  // By all of them, whoever has failed.
+  const bool is_kept = file->sync();
   if (!done) return done.error();
-  if (!done.value() || !file->sync()) return file_error("cannot write", path, errno);
+  if (failure != 0 || !is_kept) return file_error("cannot write", path, failure != 0 ? failure : errno);
   return {};
 }
 

@@ -24,13 +24,20 @@ namespace pointwright::server {
 using protocol::Problem;
 using protocol::ProblemKind;
 
+ConfineLimits confinement(const JobParams& params, std::uint64_t bytes) {
+  constexpr double kBytesPerSecond = 4.0 * 1024 * 1024;  // of decoding, at least
+  ConfineLimits confine;
+  if (params.most_bytes > 0) confine.memory_bytes = params.most_bytes;
+  confine.deadline_seconds += static_cast<double>(bytes) / kBytesPerSecond;
+  return confine;
+}
+
 Result<ImportedCloud> read_scan(const JobParams& params) {
   const ImportParams import{.max_samples = std::numeric_limits<std::uint32_t>::max() - 1U,
                             .drop_non_finite = params.drop_non_finite};
   if (!params.confined)
     return read_local_cloud(params.input, import, std::numeric_limits<std::uint64_t>::max());
   constexpr std::uint64_t kStartBytes = std::uint64_t{1} << 20U;  // enough to know the format by
-  constexpr double kBytesPerSecond = 4.0 * 1024 * 1024;           // of decoding, at least
   const Descriptor file(::open(params.input.c_str(), O_RDONLY | O_CLOEXEC));
   std::error_code none;
   const std::uint64_t size = std::filesystem::file_size(params.input, none);
@@ -46,10 +53,8 @@ Result<ImportedCloud> read_scan(const JobParams& params) {
         .code = ErrorCode::kInvalidArgument, .message = "cannot read " + params.input, .field = "path"};
   const auto format = detect_format(start);
   if (!format) return format.error();
-  ConfineLimits confine;
-  if (params.most_bytes > 0) confine.memory_bytes = params.most_bytes;
-  confine.deadline_seconds += static_cast<double>(size) / kBytesPerSecond;
-  auto decoded = decode_confined(file.get(), size, format.value(), import, confine, nullptr);
+  auto decoded =
+      decode_confined(file.get(), size, format.value(), import, confinement(params, size), nullptr);
   if (!decoded) return decoded.error();
   return finish_cloud(std::move(decoded).value(), import);
 }
@@ -96,32 +101,36 @@ std::optional<Problem> check(const JobParams& params) {
 
 Outcome<ChosenMode> choose_mode(const JobParams& params) {
   if (auto problem = check(params)) return *problem;
-  const bool splits = resamples(params.request);
-  if (params.mode && *params.mode != JobMode::kTiles)
-    return ChosenMode{.mode = *params.mode, .file = {}, .records = {}};
+  if (params.mode && *params.mode != JobMode::kTiles) return ChosenMode{.mode = *params.mode};
   auto file = MappedFile::open(params.input);
   if (!file) return protocol::to_problem(file.error());
   auto records = ScanRecords::of(file.value().bytes());
   if (!records) return protocol::to_problem(records.error());
+  auto packed = records.value() ? Result<std::optional<PackedScan>>(std::nullopt) : packed_scan(file.value());
+  if (!packed) return protocol::to_problem(packed.error());
   const auto wanted = format_of_name(params.output);
   if (!wanted) return protocol::to_problem(wanted.error());
-  const bool fits = records.value().has_value() && records.value()->format == wanted.value();
-  if (fits && splits && !records.value()->can_grow()) {
-    if (params.mode)
-      return invalid(
-          "the file holds faces or other elements, which count its samples: with resampling use the mode "
-          "memory or "
-          "direct, which leave them out");
-    return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
-  }
+  const bool packs = wanted.value() == CloudFormat::kDracoTiles;
+  const bool is_ply = packed.value() || (records.value() && records.value()->format == CloudFormat::kPly);
+  const bool fits = is_ply ? packs || wanted.value() == CloudFormat::kPly
+                           : records.value() && records.value()->format == wanted.value();
+  const bool can_grow = !records.value() || records.value()->can_grow();
+  if (fits && (can_grow || !resamples(params.request)))
+    return ChosenMode{.mode = JobMode::kTiles,
+                      .file = std::move(file).value(),
+                      .records = std::move(records).value(),
+                      .packed = packed.value(),
+                      .packs = packs};
+  if (!params.mode) return ChosenMode{.mode = JobMode::kMemory};
   if (fits)
-    return ChosenMode{.mode = JobMode::kTiles, .file = std::move(file).value(), .records = *records.value()};
-  if (!params.mode) return ChosenMode{.mode = JobMode::kMemory, .file = {}, .records = {}};
+    return invalid(
+        "the file holds faces or other elements, which count its samples: with resampling use the mode "
+        "memory or direct, which leave them out");
   return Problem{
       .kind = ProblemKind::kUnsupportedFormat,
       .detail =
-          "in tiles are read binary PLY, whose vertices have no lists, and LAS, and written as what "
-          "they were: use the mode memory"};
+          "in tiles are read PLY, whose vertices have no lists where it is binary, and Draco tiles, written "
+          "as either, and LAS, written as LAS: use the mode memory"};
 }
 
 }  // namespace pointwright::server

@@ -22,7 +22,7 @@ class SharedFile {
   virtual ~SharedFile() = default;
   /// False: errno says why. Any thread.
   virtual bool write_at(std::span<const std::byte> bytes, std::uint64_t offset) = 0;
-  /// On the disk, what this one wrote. False: errno says why.
+  /// On the disk, what this one wrote: done by all. False: errno says why.
   virtual bool sync() = 0;
 };
 

@@ -52,6 +52,9 @@ Descriptor opened(const std::string& path, int flags) {
 std::string spool_path(const std::string& folder) {
   return folder + "/samples.bin";
 }
+std::string records_path(const std::string& folder) {
+  return folder + "/records.bin";
+}
 std::string index_path(const std::string& folder) {
   return folder + "/samples.index";
 }
@@ -89,6 +92,10 @@ void for_each(std::size_t count, const Work& work) {
   parallel_for(count, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) work(i);
   });
+}
+
+std::byte* bytes_of(TileSample* samples) {
+  return reinterpret_cast<std::byte*>(samples);
 }
 
 Vec3f place_of(const TileSample& sample) {
@@ -154,16 +161,16 @@ bool TileStore::is_ours(const std::filesystem::path& path) {
   // What is being written has a name of its own behind that.
   const std::string name = path.filename().string();
   const std::string whole = name.substr(0, name.find(".new-"));
-  return whole == "job.id" || whole == "samples.bin" || whole == "samples.index" ||
+  return whole == "job.id" || whole == "samples.bin" || whole == "records.bin" || whole == "samples.index" ||
          (whole.starts_with("tile-") && whole.ends_with(".result"));
 }
 
-void TileStore::clear() const {
+void TileStore::clear(const std::string& folder) {
   std::error_code none;
   for (const char* const name : {"job.id", "samples.index"})
-    std::filesystem::remove(folder_ + "/" + name, none);
+    std::filesystem::remove(folder + "/" + name, none);
   std::vector<std::filesystem::path> ours;
-  for (const auto& entry : std::filesystem::directory_iterator(folder_, none))
+  for (const auto& entry : std::filesystem::directory_iterator(folder, none))
     if (is_ours(entry.path())) ours.push_back(entry.path());
   for (const auto& path : ours) std::filesystem::remove(path, none);
 }
@@ -179,11 +186,13 @@ Result<void> TileStore::finish() const {
 }
 
 Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records, Team& team,
-                             const ExecutionContext& context) {
+                             const ExecutionContext& context, bool with_records) {
   const std::string path = spool_path(folder_);
   const Descriptor spool = opened(path, O_WRONLY);
   // Nobody leaves before all have met below.
   std::atomic<int> failure{spool.is_open() ? 0 : errno};
+  const Descriptor whole = with_records ? opened(records_path(folder_), O_WRONLY | O_CREAT) : Descriptor();
+  if (with_records && !whole.is_open()) failure = errno;
   const std::byte* const first = file.bytes().data() + records.begin;
   // Every chunk has its place in the spool, so they may be sorted and written side by side.
   const auto chunks = static_cast<std::size_t>((records.count + kChunkSamples - 1) / kChunkSamples);
@@ -192,6 +201,7 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
   const auto sort_chunks = [&] {
     std::vector<std::uint32_t> cells;
     std::vector<TileSample> sorted;
+    std::vector<std::byte> bytes;
     std::vector<std::size_t> place(cuts_.cell_count() + 1);
     for (std::size_t chunk = next++; chunk < chunks; chunk = next++) {
       if (!team.takes(chunk)) continue;
@@ -226,6 +236,13 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
       }
       if (!write_all_at(spool.get(), std::as_bytes(std::span(sorted)), begin * sizeof(TileSample)))
         failure = errno;
+      if (with_records) {
+        const auto each = static_cast<std::size_t>(records.record_bytes);
+        bytes.resize(count * each);
+        for (std::size_t i = 0; i < count; ++i)
+          std::memcpy(bytes.data() + i * each, first + sorted[i].index * each, each);
+        if (!write_all_at(whole.get(), bytes, begin * each)) failure = errno;
+      }
       file.release(records.begin + begin * records.record_bytes,
                    records.begin + (begin + count) * records.record_bytes);
     }
@@ -253,27 +270,25 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
   return {};
 }
 
-bool TileStore::read_cell(int spool, std::size_t cell, TileSample* to) const {
+bool TileStore::read_cell(int spool, std::size_t cell, std::byte* to, std::size_t each) const {
   for (const Extent& extent : extents_[cell]) {
-    auto* at = reinterpret_cast<char*>(to);
-    std::uint64_t left = extent.count * sizeof(TileSample);
-    std::uint64_t from = extent.first * sizeof(TileSample);
+    std::uint64_t left = extent.count * each;
+    std::uint64_t from = extent.first * each;
     while (left > 0) {
-      const ssize_t got = ::pread(spool, at, static_cast<std::size_t>(left), static_cast<off_t>(from));
+      const ssize_t got = ::pread(spool, to, static_cast<std::size_t>(left), static_cast<off_t>(from));
       if (got < 0 && errno == EINTR) continue;
       if (got == 0) errno = EIO;
       if (got <= 0) return false;
-      at += got;
+      to += got;
       from += static_cast<std::uint64_t>(got);
       left -= static_cast<std::uint64_t>(got);
     }
-    to += extent.count;
   }
   return true;
 }
 
 Result<std::vector<TileSample>> TileStore::read_around(
-    std::size_t tile, const std::function<Box3f(std::span<const TileSample>)>& widened) const {
+    std::size_t tile, const std::function<std::optional<Box3f>(std::span<const TileSample>)>& widened) const {
   const std::string path = spool_path(folder_);
   const Descriptor spool = opened(path, O_RDONLY);
   if (!spool.is_open()) return file_error("cannot read", path, errno);
@@ -288,11 +303,14 @@ Result<std::vector<TileSample>> TileStore::read_around(
       last - first,
       [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k)
-          if (!read_cell(spool.get(), first + k, samples.data() + place[k])) failure = errno;
+          if (!read_cell(spool.get(), first + k, bytes_of(samples.data() + place[k]), sizeof(TileSample)))
+            failure = errno;
       },
       1);
   if (failure != 0) return file_error("cannot read", path, failure);
-  const Box3f box = widened(samples);
+  const std::optional<Box3f> wider = widened(samples);
+  if (!wider) return samples;
+  const Box3f& box = *wider;
   std::vector<std::uint32_t> others = cuts_.cells_in(box);
   std::erase_if(others, [&](std::uint32_t cell) { return cell >= first && cell < last; });
   std::vector<std::vector<TileSample>> around(others.size());
@@ -302,7 +320,7 @@ Result<std::vector<TileSample>> TileStore::read_around(
         std::vector<TileSample> all;
         for (std::size_t k = begin; k < end; ++k) {
           all.resize(static_cast<std::size_t>(cell_samples(others[k])));
-          if (!read_cell(spool.get(), others[k], all.data())) failure = errno;
+          if (!read_cell(spool.get(), others[k], bytes_of(all.data()), sizeof(TileSample))) failure = errno;
           for (const TileSample& sample : all) {
             const Vec3f p = place_of(sample);
             if ((p.array() >= box.min.array()).all() && (p.array() <= box.max.array()).all())
@@ -314,6 +332,28 @@ Result<std::vector<TileSample>> TileStore::read_around(
   if (failure != 0) return file_error("cannot read", path, failure);
   for (const auto& more : around) samples.insert(samples.end(), more.begin(), more.end());
   return samples;
+}
+
+Result<std::vector<std::byte>> TileStore::own_records(std::size_t tile, std::size_t record_bytes) const {
+  const auto samples = read_around(tile, [](std::span<const TileSample>) { return std::nullopt; });
+  if (!samples) return samples.error();
+  const std::string path = records_path(folder_);
+  const Descriptor whole = opened(path, O_RDONLY);
+  if (!whole.is_open()) return file_error("cannot read", path, errno);
+  const std::size_t count = samples.value().size();
+  std::vector<std::byte> by_cell(count * record_bytes);
+  std::byte* to = by_cell.data();
+  for (std::size_t cell = cuts_.first_cell(tile); cell < cuts_.first_cell(tile + 1); ++cell) {
+    if (!read_cell(whole.get(), cell, to, record_bytes)) return file_error("cannot read", path, errno);
+    to += cell_samples(cell) * record_bytes;
+  }
+  std::vector<std::uint32_t> order(count);
+  for (std::size_t i = 0; i < count; ++i) order[i] = static_cast<std::uint32_t>(i);
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return samples.value()[i].index; });
+  std::vector<std::byte> records(by_cell.size());
+  for (std::size_t i = 0; i < count; ++i)
+    std::memcpy(records.data() + i * record_bytes, by_cell.data() + order[i] * record_bytes, record_bytes);
+  return records;
 }
 
 Result<TileInput> TileStore::load(std::size_t tile, std::uint32_t rings, std::uint32_t neighbors,

@@ -65,17 +65,18 @@ class TileStore {
 
   /// Whether sort() has come to its end in this folder before, with so many samples.
   [[nodiscard]] bool is_sorted(std::uint64_t samples);
-  /// Whether a job writes files of that name into its folder.
+  /// Whether a store writes files of that name into its folder, or a job beside it.
   [[nodiscard]] static bool is_ours(const std::filesystem::path& path);
-  /// Deletes all that jobs have written into the folder: first what says that it is whole.
-  void clear() const;
+  /// Deletes all of them in the folder: first what says that it is whole.
+  static void clear(const std::string& folder);
   /// The leader's, before anybody sorts. Errors: those of sort()
   [[nodiscard]] Result<void> begin() const;
-  /// One pass over the scan: every sample into its tile. Done by all of the team.
+  /// One pass over the scan: every sample into its tile, with its whole record where they are to be read tile
+  /// by tile. Done by all of the team.
   /// Errors: kTooLarge (the disk is full; field "path"), kInvalidArgument (it cannot be written), kCancelled
-  /// Cost:   32 bytes of disk a sample, and 36 of memory for 2^22 samples
+  /// Cost:   32 bytes of disk a sample, and 36 of memory for 2^22 samples; the records' bytes of both besides
   Result<void> sort(const MappedFile& file, const ScanRecords& records, Team& team,
-                    const ExecutionContext& context);
+                    const ExecutionContext& context, bool with_records = false);
   /// The leader's, once all have sorted: from then on the folder is sorted. Errors: those of sort()
   [[nodiscard]] Result<void> finish() const;
 
@@ -89,6 +90,10 @@ class TileStore {
                                        float least_ring, bool has_normals,
                                        const std::optional<Box3f>& scan = std::nullopt) const;
 
+  /// The records of the tile's own samples, in the scan's order. Pre: sorted with records, so long each
+  /// Errors: kInvalidArgument (cannot be read)
+  [[nodiscard]] Result<std::vector<std::byte>> own_records(std::size_t tile, std::size_t record_bytes) const;
+
   /// Of one step of an animation; a plain job has step 0 alone.
   [[nodiscard]] bool has_result(std::size_t tile, std::size_t step) const;
   /// On the disk once it returns. Errors: those of write_file_atomically
@@ -101,11 +106,13 @@ class TileStore {
     std::uint64_t count = 0;
   };
   [[nodiscard]] std::uint64_t cell_samples(std::size_t cell) const;
-  /// All samples of the cell, to `to`. False: errno says why.
-  bool read_cell(int spool, std::size_t cell, TileSample* to) const;
-  /// The tile's samples, then those of other tiles in the box that `widened` makes of the first ones.
+  /// What a spool has of all samples of the cell, so many bytes each, to `to`. False: errno says why.
+  bool read_cell(int spool, std::size_t cell, std::byte* to, std::size_t each) const;
+  /// The tile's samples, then those of other tiles in the box that `widened` makes of the first ones; without
+  /// one the tile's alone.
   Result<std::vector<TileSample>> read_around(
-      std::size_t tile, const std::function<Box3f(std::span<const TileSample>)>& widened) const;
+      std::size_t tile,
+      const std::function<std::optional<Box3f>(std::span<const TileSample>)>& widened) const;
   [[nodiscard]] std::vector<std::byte> index_bytes() const;
   bool read_index();
 

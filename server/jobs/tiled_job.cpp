@@ -1,7 +1,5 @@
 #include "server/jobs/tiled_job.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 
@@ -25,9 +23,9 @@
 
 #include "engine/core/parallel.h"
 #include "engine/simplification/subsample.h"
-#include "server/base/descriptor.h"
 #include "server/base/sha256.h"
 #include "server/ingest/files.h"
+#include "server/jobs/packed_result.h"
 #include "server/jobs/recipe_script.h"
 #include "server/jobs/result_writer.h"
 #include "server/jobs/scan_survey.h"
@@ -48,17 +46,18 @@ constexpr std::uint64_t kLeastSurveyed = 200'000;
 
 class TiledJob {
  public:
-  TiledJob(const JobParams& params, const MappedFile& file, const ScanRecords& records, Team& team,
-           const ExecutionContext& context, const JobProgress& progress)
+  TiledJob(const JobParams& params, const TiledScan& scan, Team& team, const ExecutionContext& context,
+           const JobProgress& progress)
       : params_(params),
-        file_(file),
-        records_(records),
+        file_(scan.file),
+        records_(scan.records),
         team_(team),
         context_(context),
         progress_(progress),
-        outputs_(outputs_of(params)) {}
+        outputs_(scan.outputs),
+        is_packed_afterwards_(scan.is_packed_afterwards) {}
 
-  Outcome<JobReport> run() {
+  Outcome<TiledResult> run() {
     report_.samples = records_.count;
     if (auto problem = team_.agree(look())) return *problem;
     if (auto problem = team_.agree(play())) return *problem;
@@ -67,24 +66,12 @@ class TiledJob {
     if (auto problem = team_.agree(edit_tiles())) return *problem;
     sum_tiles_kept();
     if (auto problem = write()) return *problem;
-    if (team_.leads()) {
-      store_->clear();
-      std::error_code ignored;
-      std::filesystem::remove(params_.folder, ignored);  // unless there is something of others in it
-    }
-    progress_("done", 1.0);
-    return report_;
+    return TiledResult{.report = report_, .is_changed = is_changed_};
   }
 
  private:
   std::optional<Problem> look() {
     progress_("survey", 0.0);
-    std::error_code error;
-    std::filesystem::create_directories(params_.folder, error);
-    if (error)
-      return Problem{.kind = ProblemKind::kStorageFailed, .detail = params_.folder + ": " + error.message()};
-    auto problem = team_.leads() ? lock() : std::nullopt;
-    if (auto any = team_.agree(problem)) return any;
     const std::uint64_t wanted = std::max(kCandidates * params_.preview_count, kLeastSurveyed);
     auto found = survey(file_, records_, wanted, team_, context_);
     if (!found) return protocol::to_problem(found.error());
@@ -93,16 +80,6 @@ class TiledJob {
     if (candidates_.size() == 0)
       return Problem{.kind = ProblemKind::kInvalidValue, .detail = "the scan has no samples"};
     return std::nullopt;
-  }
-
-  /// The folder is this job's as long as it lives, however it ends.
-  std::optional<Problem> lock() {
-    lock_ = Descriptor(::open(params_.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (!lock_.is_open())
-      return Problem{.kind = ProblemKind::kStorageFailed,
-                     .detail = params_.folder + ": " + std::system_category().message(errno)};
-    if (::flock(lock_.get(), LOCK_EX | LOCK_NB) == 0) return std::nullopt;
-    return Problem{.kind = ProblemKind::kWrongState, .detail = "another job works in " + params_.folder};
   }
 
   /// Room for the spool, the tiles' results and the output, before anything is written. What an interrupted
@@ -130,8 +107,14 @@ class TiledJob {
     const std::uint64_t inserted = inserted_by_preview();
     const std::uint64_t all = (1 + outputs_.size()) * sizeof(TileSample) * records_.count +
                               outputs_.size() * inserted * (sizeof(std::uint64_t) + records_.record_bytes);
-    const std::uint64_t scratch = all - std::min(all, kept);
-    const std::uint64_t output = outputs_.size() * (file_.bytes().size() + inserted * records_.record_bytes);
+    // What is packed is about as long as its records.
+    const std::uint64_t cloud = file_.bytes().size() + inserted * records_.record_bytes;
+    const std::uint64_t output = outputs_.size() * cloud;
+    const std::uint64_t packing =
+        is_packed_afterwards_
+            ? output + cloud + packing_bytes(records_.count + inserted, records_.record_bytes)
+            : 0;
+    const std::uint64_t scratch = all - std::min(all, kept) + packing;
     const std::string beside = std::filesystem::path(params_.output).parent_path().string();
     const Place here = place_of(params_.folder);
     const Place there = place_of(beside.empty() ? "." : beside);
@@ -270,7 +253,7 @@ class TiledJob {
 
   /// What is left of another job goes, what says that it is whole first.
   [[nodiscard]] std::optional<Problem> begin_sorting() const {
-    store_->clear();
+    TileStore::clear(params_.folder);
     if (!sync_folder(params_.folder))
       return Problem{.kind = ProblemKind::kStorageFailed,
                      .detail = params_.folder + ": " + std::system_category().message(errno)};
@@ -392,7 +375,6 @@ class TiledJob {
   std::optional<Problem> write() {
     for (std::size_t step = 0; step < outputs_.size(); ++step)
       if (auto problem = write(step)) return problem;
-    report_.files = outputs_;
     return std::nullopt;
   }
 
@@ -428,6 +410,7 @@ class TiledJob {
         differences.add(static_cast<double>(match.difference));
     differences.report(report_);
 
+    is_changed_.push_back(report_.moved + report_.inserted + report_.removed > 0);
     ResultWriter writer(file_, records_, team_, played_.script.origin, context_,
                         [&](double part) { progress_result(step, part); });
     return writer.write(outputs_[step], tiles);
@@ -449,20 +432,21 @@ class TiledJob {
   Cloud candidates_;
   std::shared_ptr<const Cloud> preview_;
   const std::vector<std::string> outputs_;  // one for each step
+  const bool is_packed_afterwards_;
   PlayedSteps played_;
   std::uint32_t rings_ = 1;
   TilePlan plan_;
   bool resamples_ = false;
   std::optional<Box3f> scan_box_;  // where tiles owe each other more than positions
-  Descriptor lock_;                // on the folder; the leader's
+  std::vector<bool> is_changed_;   // by step
   std::optional<TileStore> store_;
 };
 
 }  // namespace
 
-Outcome<JobReport> run_tiles(const JobParams& params, const MappedFile& file, const ScanRecords& records,
-                             Team& team, const ExecutionContext& context, const JobProgress& progress) {
-  return TiledJob(params, file, records, team, context, progress).run();
+Outcome<TiledResult> run_tiles(const JobParams& params, const TiledScan& scan, Team& team,
+                               const ExecutionContext& context, const JobProgress& progress) {
+  return TiledJob(params, scan, team, context, progress).run();
 }
 
 void DifferenceSum::add(double difference) {

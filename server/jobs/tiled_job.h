@@ -1,9 +1,11 @@
 #pragma once
 
+// The tiles of a job: from records to records, in bounded memory.
+
 #include <cstdint>
 #include <memory>
-
-// The tiles of a job: from records to records, in bounded memory.
+#include <string>
+#include <vector>
 
 #include "server/jobs/full_resolution.h"
 #include "server/jobs/mapped_file.h"
@@ -12,9 +14,20 @@
 
 namespace pointwright::server {
 
-/// JobMode::kTiles. Done by all of the team.
-Outcome<JobReport> run_tiles(const JobParams& params, const MappedFile& file, const ScanRecords& records,
-                             Team& team, const ExecutionContext& context, const JobProgress& progress);
+/// What tiles are made of, and where what they give goes.
+struct TiledScan {
+  const MappedFile& file;
+  const ScanRecords& records;
+  std::vector<std::string> outputs;   ///< one for each cloud, as records
+  bool is_packed_afterwards = false;  ///< each of them, into the output of the job
+};
+struct TiledResult {
+  JobReport report;
+  std::vector<bool> is_changed;  ///< by cloud: anything at all
+};
+/// JobMode::kTiles, in a folder that is the job's, where its files stay. Done by all of the team.
+Outcome<TiledResult> run_tiles(const JobParams& params, const TiledScan& scan, Team& team,
+                               const ExecutionContext& context, const JobProgress& progress);
 
 /// Root mean square and greatest of what came apart, into the report.
 class DifferenceSum {

@@ -48,6 +48,7 @@ Result<CloudFormat> format_of(std::span<const std::byte> start, const ImportRequ
   if (request.media_type == "model/obj") return CloudFormat::kObj;
   if (request.media_type == "model/x-pcd") return CloudFormat::kPcd;
   if (request.media_type == "application/vnd.las") return CloudFormat::kLas;
+  if (request.media_type == "application/zip") return CloudFormat::kDracoTiles;
   return detect_format(start);
 }
 

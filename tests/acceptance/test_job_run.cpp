@@ -104,6 +104,53 @@ TEST_CASE("a job that is killed at any moments and started again gives the bytes
   CHECK_FALSE(std::filesystem::exists(out + ".job"));
 }
 
+TEST_CASE(
+    "packed scans come in and out by the command line, decoded in confined processes where that is asked "
+    "for") {
+  const TemporaryFolder folder;
+  const std::string in = folder / "in.zip";
+  std::ofstream(in, std::ios::binary) << file_of(wavy_sheet(200), CloudFormat::kDracoTiles);
+  std::ofstream(folder / "recipe.json") << kRecipe;
+  const auto command = [&](const std::string& output, const std::vector<std::string>& more) {
+    std::vector<std::string> words{
+        POINTWRIGHT_PATH, "job",  "run",      "--recipe", folder / "recipe.json", "--in", in,
+        "--out",          output, "--memory", "64",       "--preview-count",      "2500", "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  const Ended plain = run(command(folder / "plain.zip", {}));
+  REQUIRE_MESSAGE(plain.status == 0, plain.err);
+  const auto report = nlohmann::json::parse(plain.out);
+  CHECK(report["mode"] == "tiles");
+  CHECK(report["moved"].get<int>() > 10'000);
+  const Ended confined = run(command(folder / "confined.zip", {"--confined", "--most-memory", "2048"}));
+  REQUIRE_MESSAGE(confined.status == 0, confined.err);
+  const std::string expected = bytes_of(folder / "plain.zip");
+  CHECK(bytes_of(folder / "confined.zip") == expected);
+#ifdef POINTWRIGHT_MPIEXEC
+  for (const std::string ranks : {"2", "4"}) {
+    CAPTURE(ranks);
+    const std::string out = folder / ("by" + ranks + ".zip");
+    std::vector<std::string> several = command(out, {"--threads", "1"});
+    const std::vector<std::string> launcher{POINTWRIGHT_MPIEXEC, "--allow-run-as-root", "--oversubscribe",
+                                            "-n", ranks};
+    several.insert(several.begin(), launcher.begin(), launcher.end());
+    const Ended ended = run(several);
+    REQUIRE_MESSAGE(ended.status == 0, ended.err);
+    CHECK(bytes_of(out) == expected);
+    CHECK_FALSE(std::filesystem::exists(out + ".job"));
+  }
+#endif
+  // A tile that cannot be decoded is told by its name.
+  std::string torn = bytes_of(in);
+  torn.replace(torn.find("DRACO"), 5, "DRACA");
+  std::ofstream(in, std::ios::binary) << torn;
+  const Ended refused = run(command(folder / "none.zip", {"--confined"}));
+  CHECK(refused.status != 0);
+  CHECK(refused.err.find("tiles/000000.drc") != std::string::npos);
+  CHECK_FALSE(std::filesystem::exists(folder / "none.zip"));
+}
+
 #ifdef POINTWRIGHT_MPIEXEC
 TEST_CASE("one process or several under mpirun give the same bytes, and go on with each other's work") {
   const TemporaryFolder folder;

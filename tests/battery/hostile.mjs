@@ -29,7 +29,7 @@ async function eightAtOnce(count, work) {
 
 /** Uploads mutants of the corpus. */
 async function uploads(report, daemon, count, random) {
-  const seeds = ["draco", "ply", "xyz", "obj", "pcd", "las"].flatMap((folder) => {
+  const seeds = ["draco", "draco_tiles", "ply", "xyz", "obj", "pcd", "las"].flatMap((folder) => {
     try {
       return corpus(folder);
     } catch {

@@ -6,6 +6,7 @@
 #include "engine/io/cloud_io.h"
 #include "engine/io/decoded_cloud.h"
 #include "engine/io/draco_gate.h"
+#include "engine/io/draco_tiles.h"
 #include "tests/fuzz/targets.h"
 
 namespace pointwright::fuzz {
@@ -58,6 +59,21 @@ void try_draco(std::span<const std::byte> bytes) {
   const auto claim = draco_gate(bytes, kParams.max_samples);
   if (!claim.ok() || claim.value().faces > 100'000) return;
   try_format(bytes, CloudFormat::kDraco);
+}
+
+void try_draco_tiles(std::span<const std::byte> bytes) {
+  static_cast<void>(detect_format(bytes));
+  static_cast<void>(parse_draco_tiles_index({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
+                                            kParams.max_samples));
+  auto reader = DracoTilesReader::open(bytes, kParams.max_samples);
+  if (!reader.ok()) return;
+  while (true) {
+    const auto piece = reader.value().next();
+    if (!piece.ok() || !piece.value()) break;
+    const auto claim = draco_gate(piece.value()->bytes, kParams.max_samples);
+    if (claim.ok() && claim.value().faces > 100'000) return;
+  }
+  try_format(bytes, CloudFormat::kDracoTiles);
 }
 
 void try_ply(std::span<const std::byte> bytes) {

@@ -7,6 +7,8 @@
 
 namespace pointwright::fuzz {
 
+void try_draco_tiles(
+    std::span<const std::byte> bytes);             ///< the archive, its index, and each tile as try_draco
 void try_draco(std::span<const std::byte> bytes);  ///< the gate, then the decoder behind it, then finishing
 void try_ply(std::span<const std::byte> bytes);    ///< reader, finishing, and writer and reader again
 void try_xyz(std::span<const std::byte> bytes);    ///< the same

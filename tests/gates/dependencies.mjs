@@ -28,6 +28,7 @@ const fenced = [
   { name: "OpenSSL", header: /^openssl\//, allowed: /^(server|tests)\// },
   { name: "sockets", header: /^(sys\/socket|netinet\/.*|arpa\/.*|netdb)\.h$/, allowed: /^(server|tests)\// },
   { name: "Draco", header: /^draco\//, allowed: /^(engine\/io|tests)\// },
+  { name: "libarchive", header: /^archive(_entry)?\.h$/, allowed: /^engine\/io\// },
   { name: "nanoflann", header: /^nanoflann/, allowed: /^(engine\/spatial|tests)\// },
   { name: "TBB", header: /^(oneapi|tbb)\//, allowed: /^(engine\/core\/worker_threads|tests\/)/ },
   {

@@ -27,6 +27,7 @@ std::size_t replay(const char* target, void (*run)(std::span<const std::byte>)) 
 
 TEST_CASE("the fuzzing corpus passes through every reader") {
   CHECK(replay("draco", fuzz::try_draco) > 0);
+  CHECK(replay("draco_tiles", fuzz::try_draco_tiles) > 0);
   CHECK(replay("ply", fuzz::try_ply) > 0);
   CHECK(replay("xyz", fuzz::try_xyz) > 0);
   CHECK(replay("obj", fuzz::try_obj) > 0);

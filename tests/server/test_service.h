@@ -130,6 +130,16 @@ struct TestService {
     REQUIRE(get(path).body["state"] == "ready");
     return path;
   }
+  /// As if idle sessions were long forgotten, until so many are gone. Who has just built or used one lets go
+  /// of it in a moment.
+  std::size_t expire_idle(std::size_t count) {
+    std::size_t gone = 0;
+    for (int i = 0; i < 2500 && gone < count; ++i) {
+      if (i > 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      gone += service.sessions.expire(std::chrono::system_clock::now() + std::chrono::hours(1));
+    }
+    return gone;
+  }
   std::string open_painted() {
     const std::string path = open_session();
     REQUIRE(ask(Method::kPost, path + "/regions/zero/operations", kSphere).status == 200);

@@ -181,7 +181,7 @@ TEST_CASE("links go with their session, whether it is deleted or expires, and wi
     REQUIRE(service.ask(Method::kDelete, deleted).status == 204);
     CHECK(rows(service) == 1);
     CHECK(status_of(service, deleted, of_deleted) == 401);
-    CHECK(service.service.sessions.expire(std::chrono::system_clock::now() + 1h) == 1);
+    CHECK(service.expire_idle(1) == 1);
     CHECK(rows(service) == 0);
     CHECK(status_of(service, expired, of_expired) == 401);
     CHECK(service.service.access.shares.list(id_of(expired)).empty());
@@ -293,11 +293,7 @@ TEST_CASE("without a data folder links end with the service") {
     CHECK(status_of(service, path, capability) == 200);
     const std::string other = service.open_session();
     const std::string of_other = share(service, other).body["capability"];
-    // One that somebody still works on is not idle, and stays for the moment.
-    std::size_t gone = 0;
-    for (int i = 0; i < 500 && gone < 2; ++i, std::this_thread::sleep_for(10ms))
-      gone += service.service.sessions.expire(std::chrono::system_clock::now() + 1h);
-    CHECK(gone == 2);
+    CHECK(service.expire_idle(2) == 2);
     CHECK(status_of(service, other, of_other) == 401);
   }
   TestService service;

@@ -433,7 +433,8 @@ void add_history_commands(CLI::App& app, RemoteCommands& commands) {
         download(context.service, std::move(request), options->output, context.out);
       });
   save->add_option("-o,--output", options->output, "the file; - for the standard output")->required();
-  save->add_option("--format", options->format, "ply, draco, xyz or frame; the file name's where not given");
+  save->add_option("--format", options->format,
+                   "ply, las, draco, draco-tiles, xyz or frame; the file name's where not given");
   save->add_option("--level", options->level, "of the hierarchy; the finest where not given");
   save->add_option("--part", options->s, "the applied edits played this far, 0 to 1");
   save->add_option("--timing", options->timing, "with --part: sequence or together");

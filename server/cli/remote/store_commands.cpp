@@ -228,7 +228,8 @@ void add_cloud_commands(CLI::App& app, RemoteCommands& commands) {
         download(context.service, std::move(request), wanted->output, context.out);
       });
   fetch->add_option("-o,--output", wanted->output, "the file; - for the standard output")->required();
-  fetch->add_option("--format", wanted->format, "ply, draco or xyz; the file name's where not given");
+  fetch->add_option("--format", wanted->format,
+                    "ply, las, draco, draco-tiles or xyz; the file name's where not given");
   CLI::App* const remove =
       commands.add(*group, "delete", "delete a cloud that no session uses", [wanted](const Context& context) {
         (void)context.service.ask("DELETE", "/v1/clouds/" + url_encoded(wanted->id), nullptr);
@@ -298,7 +299,7 @@ void add_job_commands(CLI::App& app, RemoteCommands& commands) {
   submit->add_option("--preview-cloud", wanted->preview_cloud, "beside a recipe: the cloud that was edited");
   submit->add_option("--preview-count", wanted->preview, "or how many samples of the scan stand in for it");
   submit->add_option("--format", wanted->format,
-                     "of the result: ply, las, draco or xyz; else that of the scan");
+                     "of the result: ply, las, draco, draco-tiles or xyz; else that of the scan");
   submit->add_option("--steps", wanted->steps, "an animation of so many clouds, from s = 0 on");
   submit->add_option("--mode", wanted->mode, "tiles, memory or direct; else tiles where that can be");
   submit->add_option("--priority", wanted->priority, "0 to 9; higher ones go first");

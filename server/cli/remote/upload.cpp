@@ -240,6 +240,7 @@ class ResumableUpload {
 std::string media_type_of(const std::string& file) {
   const std::string extension = std::filesystem::path(file).extension().string();
   if (extension == ".drc") return "model/x-draco";
+  if (extension == ".zip") return "application/zip";
   if (extension == ".ply") return "application/x-ply";
   if (extension == ".xyz" || extension == ".txt" || extension == ".asc") return "text/plain";
   return "application/octet-stream";

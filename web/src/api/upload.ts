@@ -11,6 +11,7 @@ export function mediaTypeOf(name: string): string {
   if (extension === "las") return "application/vnd.las";
   if (extension === "pcd") return "model/x-pcd";
   if (extension === "obj") return "model/obj";
+  if (extension === "zip") return "application/zip";
   return "application/octet-stream";
 }
 

@@ -1075,7 +1075,7 @@ export interface components {
         /** @description What was found in an upload */
         ImportReport: {
             /** @enum {string} */
-            format: "draco" | "ply" | "xyz" | "obj" | "pcd" | "las";
+            format: "draco" | "ply" | "xyz" | "obj" | "pcd" | "las" | "draco-tiles";
             /** @description As the format calls it, like binary_little_endian */
             encoding: string;
             /** @description What the file's header claims */
@@ -1127,7 +1127,7 @@ export interface components {
              * @description Absent: found out
              * @enum {string}
              */
-            format?: "draco" | "ply" | "xyz" | "obj" | "pcd" | "las";
+            format?: "draco" | "ply" | "xyz" | "obj" | "pcd" | "las" | "draco-tiles";
         };
         /** @description A resumable upload */
         Upload: {
@@ -1259,10 +1259,10 @@ export interface components {
         JobStatus: "accepted" | "running" | "successful" | "failed" | "dismissed";
         JobOutput: {
             /**
-             * @description That of the scan where it is absent, or PLY
+             * @description That of the scan where it is absent, or PLY. draco-tiles: a ZIP archive of Draco files, each a part of space, with an index
              * @enum {string}
              */
-            format?: "ply" | "las" | "draco" | "xyz";
+            format?: "ply" | "las" | "draco" | "xyz" | "draco-tiles";
             /** @description An animation, so many clouds from s = 0 up to s; the scan is decomposed once */
             steps?: number;
         };
@@ -2005,6 +2005,7 @@ export interface components {
                 "model/x-draco": string;
                 "text/plain": string;
                 "application/vnd.las": string;
+                "application/zip": string;
             };
         };
     };
@@ -2439,6 +2440,7 @@ export interface operations {
                 "model/x-draco": string;
                 "application/x-ply": string;
                 "application/vnd.las": string;
+                "application/zip": string;
                 "model/x-pcd": string;
                 "model/obj": string;
                 "text/plain": string;
@@ -2537,7 +2539,7 @@ export interface operations {
         parameters: {
             query?: {
                 /** @description Instead of the Accept header */
-                format?: "ply" | "draco" | "xyz" | "las";
+                format?: "ply" | "draco" | "xyz" | "las" | "draco-tiles";
                 /** @description What the file keeps beside the positions: normal, color, texcoord, and scalars by name. Absent: all. */
                 attributes?: components["parameters"]["FileAttributes"];
                 /** @description Of a PLY file */
@@ -3658,7 +3660,7 @@ export interface operations {
         parameters: {
             query?: {
                 /** @description Instead of the Accept header */
-                format?: "ply" | "draco" | "xyz" | "las" | "frame";
+                format?: "ply" | "draco" | "xyz" | "las" | "draco-tiles" | "frame";
                 /** @description Of a PLY file */
                 encoding?: components["parameters"]["Encoding"];
                 /** @description The level of the hierarchy; the finest where not given */
@@ -4022,6 +4024,7 @@ export interface operations {
                     "application/x-ply": string;
                     "model/x-draco": string;
                     "application/vnd.las": string;
+                    "application/zip": string;
                     "text/plain": string;
                 };
             };

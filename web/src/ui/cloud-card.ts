@@ -27,7 +27,7 @@ export function createCloudCard(options: CloudCardOptions): HTMLElement {
   const facts = [
     `${formatCount(cloud.sample_count)} samples`,
     formatBytes(cloud.bytes),
-    [cloud.report.format.toUpperCase(), cloud.report.encoding].filter(Boolean).join(" "),
+    [cloud.report.format.replace("-", " ").toUpperCase(), cloud.report.encoding].filter(Boolean).join(" "),
     formatAge(cloud.created),
   ];
   const notes = importNotes(cloud);

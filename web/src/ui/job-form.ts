@@ -9,7 +9,7 @@ import { problemCard } from "./problem-card";
 
 const MODES: Record<JobMode | "auto", readonly [string, string]> = {
   auto: ["Automatic", "In tiles where the scan's format allows it, else as a whole in memory."],
-  tiles: ["In tiles", "In bounded memory, for scans of any size: binary PLY and LAS."],
+  tiles: ["In tiles", "In bounded memory, for scans of any size: PLY, LAS and Draco tiles."],
   memory: ["In memory", "The whole scan at once: every format."],
   direct: ["Direct", "On levels of the scan's own instead of the preview's: takes the most time and memory."],
 };
@@ -18,7 +18,7 @@ const PRIORITIES = [
   ["5", "Normal"],
   ["2", "Low: after others"],
 ] as const;
-const FORMATS: readonly JobFormat[] = ["ply", "las", "draco", "xyz"];
+const FORMATS: readonly JobFormat[] = ["ply", "las", "draco", "draco-tiles", "xyz"];
 const MIN_STEPS = 2;
 const MAX_STEPS = 1000;
 

@@ -10,7 +10,13 @@ export const STATUS_NAMES: Record<JobStatus, string> = {
   dismissed: "Dismissed",
 };
 
-export const FORMAT_NAMES: Record<JobFormat, string> = { ply: "PLY", las: "LAS", draco: "Draco", xyz: "XYZ" };
+export const FORMAT_NAMES: Record<JobFormat, string> = {
+  ply: "PLY",
+  las: "LAS",
+  draco: "Draco",
+  "draco-tiles": "Draco tiles",
+  xyz: "XYZ",
+};
 
 export const MODE_NAMES: Record<JobMode, string> = {
   tiles: "In tiles",
@@ -20,12 +26,14 @@ export const MODE_NAMES: Record<JobMode, string> = {
 
 const PHASES: Record<string, string> = {
   reading: "Reading the scan",
+  unpacking: "Unpacking the scan",
   survey: "Looking through the scan",
   preview: "Playing the edits on the preview",
   tiles: "Sorting the samples into tiles",
   edits: "Making the edits",
   result: "Writing the result",
   writing: "Writing the result",
+  packing: "Packing the result as Draco tiles",
   done: "Finishing",
 };
 

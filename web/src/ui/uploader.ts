@@ -26,7 +26,7 @@ export function createUploader(
     type: "file",
     id,
     class: "visually-hidden",
-    accept: ".ply,.drc,.las,.pcd,.obj,.xyz,.txt,.asc",
+    accept: ".ply,.drc,.zip,.las,.pcd,.obj,.xyz,.txt,.asc",
   });
   const dropId = freshId();
   const drop = h("input", { type: "checkbox", id: dropId });
