@@ -7,7 +7,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
+#include <filesystem>
+#include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "server/base/descriptor.h"
 
@@ -29,9 +34,12 @@ std::string folder_of(const std::string& path) {
 }
 
 // A name that no other writer, in this process or another, uses at the same time.
+constexpr std::string_view kTemporary = ".new-";  // then the process and a number
+
 std::string temporary_name(const std::string& path) {
   static std::atomic<unsigned> counter{0};
-  return path + ".new-" + std::to_string(getpid()) + "-" + std::to_string(counter.fetch_add(1));
+  return std::string(path).append(kTemporary) + std::to_string(getpid()) + "-" +
+         std::to_string(counter.fetch_add(1));
 }
 
 }  // namespace
@@ -92,6 +100,22 @@ Result<void> copy_file_atomically(const std::string& path, int file, std::uint64
     return read_pieces(file, size,
                        [copy](std::span<const std::byte> piece) { return write_all(copy, piece); });
   });
+}
+
+void remove_leftovers(const std::string& path) {
+  const std::string start = std::filesystem::path(path).filename().string().append(kTemporary);
+  std::vector<std::filesystem::path> left;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_of(path), none)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(start)) continue;
+    pid_t writer = 0;
+    const char* const end = name.data() + name.size();
+    const auto [next, error] = std::from_chars(name.data() + start.size(), end, writer);
+    const bool is_ours = error == std::errc() && writer > 0 && next != end && *next == '-';
+    if (is_ours && kill(writer, 0) != 0 && errno == ESRCH) left.push_back(entry.path());
+  }
+  for (const auto& each : left) std::filesystem::remove(each, none);
 }
 
 bool read_pieces(int file, std::uint64_t size, const std::function<bool(std::span<const std::byte>)>& take) {

@@ -67,6 +67,8 @@ class MemoryJob {
       if (!made) return protocol::to_problem(made.error());
       preview = std::move(made).value();
     }
+    const ImportReport& found = imported.value().report;
+    if (auto elsewhere = check_preview(*preview, found.bounds_min, found.bounds_max)) return *elsewhere;
     report_.preview_samples = preview->size();
     const auto levels = hierarchy_for(params_.request.recipe, *preview, params_.neighbors);
     if (!levels.ok()) return levels.problem();
@@ -183,6 +185,8 @@ class TileRun {
 
   Outcome<JobReport> run() {
     if (auto problem = folder_.take(params_.folder, team_)) return *problem;
+    if (team_.leads())
+      for (const std::string& output : outputs_of(params_)) remove_leftovers(output);
     if (auto problem = unpack()) return *problem;
     auto made = run_tiles(
         params_,

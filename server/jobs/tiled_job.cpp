@@ -149,6 +149,7 @@ class TiledJob {
       if (!made) return protocol::to_problem(made.error());
       preview_ = std::move(made).value();
     }
+    if (auto elsewhere = check_preview(*preview_, surveyed_.min, surveyed_.max)) return elsewhere;
     report_.preview_samples = preview_->size();
     const auto levels = hierarchy_for(params_.request.recipe, *preview_, params_.neighbors);
     if (!levels.ok()) return levels.problem();
@@ -459,6 +460,15 @@ void DifferenceSum::report(JobReport& report) const {
   report.matched = count_;
   report.rms_difference = count_ > 0 ? std::sqrt(squares_ / static_cast<double>(count_)) : 0.0;
   report.max_difference = greatest_;
+}
+
+std::optional<Problem> check_preview(const Cloud& preview, const Vec3d& min, const Vec3d& max) {
+  const Box3f box = bounds_of(preview.position);
+  const Vec3d from = preview.origin + box.min.cast<double>();
+  const Vec3d to = preview.origin + box.max.cast<double>();
+  if ((from.array() <= max.array()).all() && (to.array() >= min.array()).all()) return std::nullopt;
+  return Problem{.kind = ProblemKind::kInvalidValue,
+                 .detail = "the preview stands elsewhere than the scan: it is of another one"};
 }
 
 Result<std::shared_ptr<const Cloud>> preview_of(const Cloud& cloud, std::uint64_t count,

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,9 @@ class DifferenceSum {
   double squares_ = 0.0;
   double greatest_ = 0.0;
 };
+
+/// Whether the preview can be of a scan between these corners. Problem: it stands elsewhere altogether
+std::optional<protocol::Problem> check_preview(const Cloud& preview, const Vec3d& min, const Vec3d& max);
 
 /// `count` evenly spaced samples of the cloud; the cloud itself where it has no more. Errors: kCancelled
 Result<std::shared_ptr<const Cloud>> preview_of(const Cloud& cloud, std::uint64_t count,

@@ -101,6 +101,8 @@ TEST_CASE("a job that is killed at any moments and started again gives the bytes
   const Ended last = run(command(out));
   REQUIRE_MESSAGE(last.status == 0, last.err);
   CHECK(bytes_of(out) == expected);
+  for (const auto& entry : std::filesystem::directory_iterator(folder / ""))
+    CHECK(entry.path().filename().string().find(".new-") == std::string::npos);
   CHECK_FALSE(std::filesystem::exists(out + ".job"));
 }
 

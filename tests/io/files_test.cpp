@@ -2,9 +2,13 @@
 
 #include <doctest/doctest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "tests/io/io_support.h"
 
@@ -43,6 +47,27 @@ TEST_CASE("what was written is read, and replaces what was there") {
   struct stat info {};
   REQUIRE(stat(path.c_str(), &info) == 0);
   CHECK((info.st_mode & 0777) == 0600);
+}
+
+TEST_CASE("what a killed writer left beside a file goes, and nothing that another one still writes") {
+  const Folder folder;
+  const std::string path = folder / "cloud.ply";
+  const pid_t child = ::fork();
+  REQUIRE(child >= 0);
+  if (child == 0) ::_exit(0);
+  REQUIRE(::waitpid(child, nullptr, 0) == child);
+  const std::string dead = path + ".new-" + std::to_string(child) + "-0";
+  const std::vector<std::string> others{path,
+                                        path + ".new-" + std::to_string(::getpid()) + "-7",
+                                        path + ".new-",
+                                        path + ".new-" + std::to_string(child),
+                                        path + ".new-plan",
+                                        folder / "other.ply.new-" + std::to_string(child) + "-0"};
+  for (const std::string& name : others) REQUIRE(write_file_atomically(name, bytes_of("x")).ok());
+  REQUIRE(write_file_atomically(dead, bytes_of("x")).ok());
+  remove_leftovers(path);
+  CHECK_FALSE(fs::exists(dead));
+  for (const std::string& name : others) CHECK(fs::exists(name));
 }
 
 TEST_CASE("files that are not there, no files, or too large are told apart") {

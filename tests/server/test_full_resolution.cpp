@@ -121,6 +121,16 @@ TEST_CASE("a preview that is given is the one that counts, in tiles and in memor
   params.mode = JobMode::kMemory;
   CHECK(job.run(params).matched == every.size());
   CHECK(cloud_of(job.out).position == expected.position);
+  // Of another scan altogether.
+  for (const JobMode mode : {JobMode::kTiles, JobMode::kMemory}) {
+    JobParams other = params;
+    auto elsewhere = std::make_shared<Cloud>(*preview);
+    elsewhere->origin = Vec3d(0.0, 2.0, 0.0);
+    other.preview = elsewhere;
+    other.mode = mode;
+    other.output = job.folder / "none.ply";
+    CHECK(job.refused(other).kind == ProblemKind::kInvalidValue);
+  }
   // About another origin, which float32 rounds a little differently.
   preview->origin = Vec3d(4.0, 0.0, 0.0);
   for (std::size_t i = 0; i < preview->size(); ++i)
@@ -427,8 +437,8 @@ TEST_CASE("jobs refuse what they cannot do, and leave nothing behind") {
   put(job.in, wavy_sheet(100));
   JobParams params = job.params();
   params.mode = JobMode::kTiles;
-  params.input = job.folder / "text.ply";
-  put(params.input, wavy_sheet(50), CloudFormat::kPly, {.ascii = true});
+  params.input = job.folder / "text.xyz";
+  put(params.input, wavy_sheet(50), CloudFormat::kXyz);
   CHECK(job.refused(params).kind == ProblemKind::kUnsupportedFormat);
 
   params.input = job.folder / "cut.ply";
