@@ -69,10 +69,16 @@ class JobBench {
     if (!write_synthetic_scan(folder_ + "/in.ply", n)) throw std::runtime_error("cannot write " + folder_);
   }
 
-  [[nodiscard]] JobFigures run() const {
-    const std::string command = "'" POINTWRIGHT_PATH "' job run --json --recipe '" + folder_ +
-                                "/recipe.json' --in '" + folder_ + "/in.ply' --out '" + folder_ +
-                                "/out.ply' --threads " + std::to_string(thread_count());
+  struct Way {
+    std::string input = "in.ply";
+    std::string output = "out.ply";
+    int threads = thread_count();
+    std::string launcher = {};  // before the command, with a blank behind it
+  };
+  [[nodiscard]] JobFigures run(const Way& way) const {
+    const std::string command = way.launcher + "'" POINTWRIGHT_PATH "' job run --json --recipe '" + folder_ +
+                                "/recipe.json' --in '" + folder_ + "/" + way.input + "' --out '" + folder_ +
+                                "/" + way.output + "' --threads " + std::to_string(way.threads);
     const double cpu_before = cpu_of_children();
     std::FILE* const pipe = ::popen(command.c_str(), "r");  // NOLINT: a command line of our own
     if (pipe == nullptr) throw std::runtime_error("cannot start " POINTWRIGHT_PATH);
@@ -103,7 +109,7 @@ void bench_jobs(BenchReport& report) {
   std::array<double, 3> seconds{};
   double peak_mb = 0.0;
   for (double& run : seconds) {
-    const JobFigures figures = bench.run();
+    const JobFigures figures = bench.run({});
     run = figures.seconds;
     peak_mb = std::max(peak_mb, figures.peak_mb);
   }
@@ -118,11 +124,49 @@ void bench_resampled_job(BenchReport& report) {
   constexpr std::uint64_t kSamples = 5'000'000;
   const JobBench bench(std::filesystem::temp_directory_path().string(), kPull);
   bench.scan(kSamples);
-  const JobFigures figures = bench.run();
+  const JobFigures figures = bench.run({});
   const auto n = static_cast<double>(kSamples);
   report.add("job.resampled.samples_per_s", "1/s", n, n / figures.seconds);
   report.add("job.resampled.out_samples", "samples", n, figures.made);
   report.add("job.resampled.rss_mb", "MB", n, figures.peak_mb);
+}
+
+void bench_packed_job(BenchReport& report) {
+  if (!report.wants("job.packed")) return;
+  constexpr std::uint64_t kSamples = 5'000'000;
+  const JobBench bench(std::filesystem::temp_directory_path().string());
+  bench.scan(kSamples);
+  const auto n = static_cast<double>(kSamples);
+  const JobFigures packing = bench.run({.output = "out.zip"});
+  report.add("job.packed.out.samples_per_s", "1/s", n, n / packing.seconds);
+  report.add("job.packed.out.rss_mb", "MB", n, packing.peak_mb);
+  const JobFigures unpacking = bench.run({.input = "out.zip"});
+  report.add("job.packed.in.samples_per_s", "1/s", n, n / unpacking.seconds);
+  report.add("job.packed.in.rss_mb", "MB", n, unpacking.peak_mb);
+}
+
+void bench_job_ranks(BenchReport& report, std::uint64_t size, const std::string& folder) {
+#ifdef POINTWRIGHT_MPIEXEC
+  if (!report.wants("job.ranks")) return;
+  const JobBench bench(folder);
+  bench.scan(size);
+  const auto n = static_cast<double>(size);
+  double alone = 0.0;
+  for (const int ranks : {1, 2}) {
+    const std::string launcher =
+        "'" POINTWRIGHT_MPIEXEC "' --allow-run-as-root -n " + std::to_string(ranks) + " ";
+    const JobFigures figures = bench.run({.threads = 1, .launcher = launcher});
+    report.add("job.ranks." + std::to_string(ranks) + ".samples_per_s", "1/s", n, n / figures.seconds);
+    if (ranks == 1)
+      alone = figures.seconds;
+    else
+      report.add("job.ranks.speedup", "times", n, alone / figures.seconds);
+  }
+#else
+  static_cast<void>(report);
+  static_cast<void>(size);
+  static_cast<void>(folder);
+#endif
 }
 
 void bench_job_growth(BenchReport& report, const std::vector<std::uint64_t>& sizes,
@@ -132,10 +176,11 @@ void bench_job_growth(BenchReport& report, const std::vector<std::uint64_t>& siz
   double last_seconds = 0.0;
   double first_slope = 0.0;
   for (const std::uint64_t size : sizes) {
-    bench.scan(size);
-    const JobFigures figures = bench.run();
-    const auto n = static_cast<double>(size);
     const std::string label = "job." + std::to_string(size / 1'000'000) + "m.";
+    if (!report.wants(label)) continue;
+    bench.scan(size);
+    const JobFigures figures = bench.run({});
+    const auto n = static_cast<double>(size);
     report.add(label + "us_per_sample", "us/point", n, 1e6 * figures.seconds / n);
     report.add(label + "cpu_us_per_sample", "us/point", n, 1e6 * figures.cpu_seconds / n);
     report.add(label + "rss_mb", "MB", n, figures.peak_mb);

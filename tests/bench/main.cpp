@@ -1,5 +1,6 @@
 // pointwright_bench [--out FILE] [--threads N] [FILTER]: runs the benchmarks whose name contains FILTER.
-// With --job-growth FOLDER: jobs on 1, 10 and 100 million samples instead, 8 GB of files below FOLDER.
+// With --job-growth FOLDER: jobs on 1, 10 and 100 million samples instead, and one of two processes, 8 GB of
+// files below FOLDER.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
 #ifdef POINTWRIGHT_BENCH_HTTP
     if (!growth.empty()) {
       pointwright::bench::bench_job_growth(report, {1'000'000, 10'000'000, 100'000'000}, growth);
+      pointwright::bench::bench_job_ranks(report, 20'000'000, growth);
       return;
     }
 #endif
@@ -51,6 +53,7 @@ int main(int argc, char** argv) {
     pointwright::bench::bench_http(report);
     pointwright::bench::bench_jobs(report);
     pointwright::bench::bench_resampled_job(report);
+    pointwright::bench::bench_packed_job(report);
 #endif
   });
   if (!report.write_json(out)) {
