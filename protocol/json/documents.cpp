@@ -224,6 +224,7 @@ JsonDocument to_json(const InfoDocument& info) {
                       {"limits", std::move(limits)},
                       {"formats", string_array(info.formats)},
                       {"features", string_array(info.features)},
+                      {"launchers", string_array(info.launchers)},
                       {"caller", info.caller}};
 }
 

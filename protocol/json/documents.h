@@ -142,7 +142,8 @@ struct InfoDocument {
   std::vector<std::pair<std::string, std::uint64_t>> limits;  ///< every limit, by name
   std::vector<std::string> formats;
   std::vector<std::string> features;
-  JsonDocument caller = {};  ///< to_json(CallerDocument)
+  std::vector<std::string> launchers;  ///< of jobs, by name
+  JsonDocument caller = {};            ///< to_json(CallerDocument)
 };
 
 std::string_view session_state_name(SessionState state);

@@ -45,11 +45,13 @@ Response get_info(Service& service, const Request& request) {
   protocol::InfoDocument info{
       .version = POINTWRIGHT_VERSION,
       .limits = {},
-      .formats = {"draco", "ply", "xyz", "las", "pcd", "obj"},
+      .formats = {"draco", "ply", "xyz", "las", "draco-tiles", "pcd", "obj"},
       .features = {"preview-stream", "undo", "single-resolution", "images", "model-regions",
                    "visible-outlines", "recipes", "partial-play", "resampling", "amend", "idempotency-keys",
                    "tus", "tokens", "shares", "previews", "named-regions", "imports", "jobs"},
+      .launchers = {std::string(protocol::kLocalLauncher)},
       .caller = protocol::to_json(service.access.describe(request.caller))};
+  for (const Launcher& launcher : service.config.launchers) info.launchers.push_back(launcher.name);
   for (const LimitInfo& limit : limit_table())
     info.limits.emplace_back(std::string(limit.name), service.config.limits.*limit.member);
   return json_response(protocol::to_json(info));

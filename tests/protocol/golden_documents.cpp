@@ -316,6 +316,7 @@ InfoDocument info() {
           .limits = {{"max_samples", 50'000'000}, {"max_upload_bytes", 2'147'483'648}, {"max_sessions", 16}},
           .formats = {"draco", "ply", "xyz"},
           .features = {"preview", "stream"},
+          .launchers = {"local", "cluster"},
           .caller = to_json(CallerDocument{.token = "Y2FsbGVyLXRva2VuLWlkMA",
                                            .name = "Ann",
                                            .scope = Scope::kEdit,

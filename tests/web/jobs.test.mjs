@@ -89,7 +89,10 @@ test("an edit is estimated, made on every sample of the scan, and downloaded", {
 
   const { page, close } = await openLifted();
   const dialog = await openJobs(page);
-  assert.match(await dialog.getByLabel("Scan").textContent(), /capsule\.ply · 12,000 samples/);
+  assert.match(
+    await dialog.getByLabel("Scan", { exact: true }).textContent(),
+    /capsule\.ply · 12,000 samples/,
+  );
   assert.match(await dialog.getByLabel("Format of the result").textContent(), /As the scan \(PLY\)/);
   await dialog.getByLabel("Way").selectOption("In memory");
   await dialog.getByText("The whole scan at once").waitFor();
@@ -169,6 +172,45 @@ test("an edit is estimated, made on every sample of the scan, and downloaded", {
   assert.equal((await json(`${service.url}/v1/jobs`)).jobs.length, 0);
   await checkTroubles(home.page, home.troubles);
   await home.page.close();
+});
+
+test("a scan that is no cloud is sent for a job alone, by a launcher, and comes back as Draco tiles", {
+  timeout,
+}, async () => {
+  const { page, close } = await openLifted();
+  const dialog = await openJobs(page);
+  await dialog.getByLabel("send the whole scan").setInputFiles({
+    name: "whole.ply",
+    mimeType: "application/octet-stream",
+    buffer: capsulePly(samples),
+  });
+  const scan = dialog.getByLabel("Scan", { exact: true });
+  await scan.getByRole("option", { name: /^whole\.ply · .*as it came$/ }).waitFor({ state: "attached" });
+  assert.match(await scan.evaluate((select) => select.selectedOptions[0].text), /^whole\.ply/);
+  await dialog.getByLabel("Format of the result").selectOption("Draco tiles");
+  const launchers = dialog.getByLabel("Started by");
+  assert.equal(await launchers.inputValue(), "local");
+  await launchers.selectOption("held");
+  await dialog.getByRole("button", { name: "Estimate" }).click();
+  await dialog.locator(".job-facts").waitFor();
+  await dialog.getByLabel("Name").fill("The whole");
+  await dialog.getByRole("button", { name: "Start", exact: true }).click();
+  await rowWith(dialog, "The whole", "Running");
+  writeFileSync(gate, "");
+  const row = await rowWith(dialog, "The whole", "Finished");
+  rmSync(gate);
+  assert.match(await row.textContent(), /Draco tiles · in tiles · .*held/);
+  const link = row.getByRole("link", { name: /^Download Draco tiles .*, The whole\.zip$/ });
+  const [download] = await Promise.all([page.waitForEvent("download"), link.click()]);
+  assert.equal(readFileSync(await download.path()).toString("latin1", 30, 39), "index.csv");
+  // It is there for the next job, too.
+  await page.keyboard.press("Escape");
+  await dialog.waitFor({ state: "detached" });
+  const again = await openJobs(page);
+  await again
+    .getByLabel("Scan", { exact: true })
+    .selectOption({ label: await again.getByRole("option", { name: /^whole\.ply/ }).textContent() });
+  await close();
 });
 
 test("jobs are followed live, dismissed, started again, and a failure says why", { timeout }, async () => {

@@ -22,6 +22,7 @@ import type {
   SessionDocument,
   SessionSummary,
   Share,
+  UploadDocument,
 } from "./types";
 
 export type Fetch = (input: string, init?: RequestInit) => Promise<Response>;
@@ -99,6 +100,11 @@ export class ApiClient {
 
   async clouds(): Promise<CloudDocument[]> {
     return (await this.json<{ clouds: CloudDocument[] }>("v1/clouds")).clouds;
+  }
+
+  /** Files that came in pieces and are no clouds yet, whole or not. */
+  async uploads(): Promise<UploadDocument[]> {
+    return (await this.json<{ uploads: UploadDocument[] }>("v1/uploads")).uploads;
   }
 
   async deleteCloud(id: string): Promise<void> {

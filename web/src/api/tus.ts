@@ -18,7 +18,7 @@ export interface Memory {
 export interface PieceOptions extends UploadOptions {
   memory?: Memory;
   /** Resolves after so many milliseconds. */
-  pause?: (ms: number) => Promise<void>;
+  pause?: Pause;
 }
 
 function base64(text: string): string {
@@ -31,16 +31,43 @@ function pauseBefore(tries: number, error: unknown): number {
   return Math.max(Math.min(250 * 2 ** tries, 10_000), 1000 * Math.min(asked, 60));
 }
 
-/** Sends a file in pieces that outlive the connection (tus 1.0.0), from where the last try ended; then imports it. */
+type Pause = (ms: number) => Promise<void>;
+const sleep: Pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const keyOf = (client: ApiClient, file: File): string =>
+  `pointwright.upload ${client.url("")} ${file.name} ${file.size} ${file.lastModified}`;
+
+/** Sends a file in pieces and imports it. */
 export async function uploadInPieces(
   client: ApiClient,
   file: File,
   options: PieceOptions = {},
 ): Promise<CloudDocument> {
   const memory = options.memory ?? globalThis.localStorage;
-  const pause = options.pause ?? ((ms) => new Promise((resolve) => setTimeout(resolve, ms)));
+  const upload = await sendInPieces(client, file, options);
+  try {
+    const cloud = await importAsked(client, upload, file.name, options, options.pause ?? sleep);
+    memory.removeItem(keyOf(client, file));
+    return cloud;
+  } catch (error) {
+    // A refused upload is there still: the next try is quick.
+    if (options.signal?.aborted) memory.removeItem(keyOf(client, file));
+    throw error;
+  }
+}
+
+/**
+ * Sends a file in pieces that outlive the connection (tus 1.0.0), from where the last try ended, and tells the upload's
+ * id. It stays as it came until it is imported, or a job takes it.
+ */
+export async function sendInPieces(
+  client: ApiClient,
+  file: File,
+  options: PieceOptions = {},
+): Promise<string> {
+  const memory = options.memory ?? globalThis.localStorage;
+  const pause = options.pause ?? sleep;
   const signal = options.signal ? { signal: options.signal } : {};
-  const key = `pointwright.upload ${client.url("")} ${file.name} ${file.size} ${file.lastModified}`;
+  const key = keyOf(client, file);
 
   const offsetOf = async (upload: string): Promise<number> => {
     const head = await client.request(upload, { method: "HEAD", headers: VERSION, ...signal });
@@ -98,15 +125,7 @@ export async function uploadInPieces(
     }
   }
   options.onProgress?.(1);
-  try {
-    const cloud = await importAsked(client, upload.split("/").pop() ?? "", file.name, options, pause);
-    memory.removeItem(key);
-    return cloud;
-  } catch (error) {
-    // A refused upload is there still: the next try is quick.
-    if (options.signal?.aborted) memory.removeItem(key);
-    throw error;
-  }
+  return upload.split("/").pop() ?? "";
 }
 
 /** Makes a cloud of a complete upload, and tells how far that is. Given up by hand, it ends and the upload goes. */
@@ -115,7 +134,7 @@ async function importAsked(
   upload: string,
   name: string,
   options: PieceOptions,
-  pause: (ms: number) => Promise<void>,
+  pause: Pause,
 ): Promise<CloudDocument> {
   const nonfinite = options.dropNonFinite ? "drop" : "reject";
   const begun = async (): Promise<ImportDocument> => {
@@ -159,11 +178,7 @@ async function importAsked(
 }
 
 /** Removes an upload that an ending import may have for a moment yet. */
-async function removeUpload(
-  client: ApiClient,
-  upload: string,
-  pause: (ms: number) => Promise<void>,
-): Promise<void> {
+async function removeUpload(client: ApiClient, upload: string, pause: Pause): Promise<void> {
   for (let tries = 0; tries < MOST_TRIES; ++tries) {
     try {
       await client.request(upload, { method: "DELETE", headers: VERSION });

@@ -19,6 +19,7 @@ export type NamedRegion = Schemas["RegionEntry"];
 export type ExportFormat = "ply" | "draco" | "xyz";
 
 export type ImportDocument = WithVectors<Schemas["Import"]>;
+export type UploadDocument = Schemas["Upload"];
 export type CloudDocument = WithVectors<Schemas["Cloud"]>;
 export type SessionDocument = WithVectors<Schemas["Session"]>;
 export type SessionSummary = WithVectors<Schemas["SessionSummary"]>;

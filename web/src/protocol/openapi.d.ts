@@ -181,7 +181,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Version, every limit by name, formats, features */
+        /** Version, every limit by name, formats, features, launchers */
         get: operations["getInfo"];
         put?: never;
         post?: never;
@@ -993,6 +993,8 @@ export interface components {
             };
             formats: string[];
             features: string[];
+            /** @description What a job's worker may be started by; none where there are no jobs */
+            launchers: string[];
             caller: components["schemas"]["Caller"];
         };
         /**

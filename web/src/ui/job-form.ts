@@ -1,11 +1,20 @@
 import type { ApiClient } from "../api/client";
 import { problemOf } from "../api/problem";
-import type { CloudDocument, Job, JobFormat, JobMode, JobRequest, SessionDocument } from "../api/types";
+import type {
+  CloudDocument,
+  Job,
+  JobFormat,
+  JobMode,
+  JobRequest,
+  SessionDocument,
+  UploadDocument,
+} from "../api/types";
 import { freshId, h, replaceChildren, setText } from "./dom";
 import { selectField, textField } from "./fields";
-import { formatCount } from "./format";
+import { formatBytes, formatCount } from "./format";
 import { estimateFacts, FORMAT_NAMES } from "./job-words";
 import { problemCard } from "./problem-card";
+import { createScanSender } from "./scan-sender";
 
 const MODES: Record<JobMode | "auto", readonly [string, string]> = {
   auto: ["Automatic", "In tiles where the scan's format allows it, else as a whole in memory."],
@@ -19,8 +28,19 @@ const PRIORITIES = [
   ["2", "Low: after others"],
 ] as const;
 const FORMATS: readonly JobFormat[] = ["ply", "las", "draco", "draco-tiles", "xyz"];
+const LOCAL = "local";
 const MIN_STEPS = 2;
 const MAX_STEPS = 1000;
+
+/** What the server has that jobs may be made of and started by. */
+export interface JobSources {
+  clouds: readonly CloudDocument[];
+  uploads: readonly UploadDocument[];
+  launchers: readonly string[];
+}
+
+/** Scans that are clouds go by their ids, files that are none by this and theirs. */
+const UPLOAD = "upload:";
 
 export interface JobForm {
   element: HTMLElement;
@@ -28,11 +48,15 @@ export interface JobForm {
   setObstacle(reason: string): void;
 }
 
+function uploadText(name: string, bytes: number): string {
+  return `${name || "A file"} · ${formatBytes(bytes)}, as it came`;
+}
+
 /** What a job of this session is to be made on, and as what; what it would take; and its start. */
 export function createJobForm(
   client: ApiClient,
   session: SessionDocument,
-  clouds: readonly CloudDocument[],
+  { clouds, uploads, launchers }: JobSources,
   onStarted: (job: Job) => void,
 ): JobForm {
   let mode: JobMode | "auto" = "auto";
@@ -46,13 +70,28 @@ export function createJobForm(
     : `This session's cloud${ownCount === undefined ? "" : ` · ${formatCount(ownCount)} samples`}`;
   const scan = selectField(
     "Scan",
-    [["", ownText] as const, ...others.map((cloud) => [cloud.id, describe(cloud)] as const)],
+    [
+      ["", ownText] as const,
+      ...others.map((cloud) => [cloud.id, describe(cloud)] as const),
+      ...uploads
+        .filter(({ length, offset }) => offset === length)
+        .map((upload) => [UPLOAD + upload.id, uploadText(upload.name, upload.length)] as const),
+    ],
     "",
     () => {
       nameFormat();
       forgetEstimate();
     },
   );
+  const sender = createScanSender(client, (id, file) => {
+    const value = UPLOAD + id;
+    if (![...scan.select.options].some((option) => option.value === value))
+      scan.select.append(h("option", { value }, uploadText(file.name, file.size)));
+    scan.select.value = value;
+    nameFormat();
+    forgetEstimate();
+  });
+  scan.element.append(sender.element);
   const format = selectField<JobFormat | "">(
     "Format of the result",
     [["", ""] as const, ...FORMATS.map((key) => [key, FORMAT_NAMES[key]] as const)],
@@ -81,6 +120,12 @@ export function createJobForm(
   );
   way.select.setAttribute("aria-describedby", hintId);
   const priority = selectField("Priority", PRIORITIES, "5", () => undefined);
+  const launcher = selectField(
+    "Started by",
+    launchers.map((key) => [key, key === LOCAL ? "This server" : key] as const),
+    LOCAL,
+    () => undefined,
+  );
   const name = textField("Name", session.name.replace(/\.[^.]+$/, ""), "");
   name.input.classList.remove("number");
   name.input.maxLength = 120;
@@ -112,13 +157,19 @@ export function createJobForm(
       output: { ...(as !== "" && { format: as as JobFormat }), ...(count !== undefined && { steps: count }) },
     };
   };
+  const source = (): Pick<JobRequest, "cloud" | "upload"> => {
+    const { value } = scan.select;
+    if (value === "") return {};
+    return value.startsWith(UPLOAD) ? { upload: value.slice(UPLOAD.length) } : { cloud: value };
+  };
   const request = (): JobRequest => ({
     session: session.id,
-    ...(scan.select.value === "" ? {} : { cloud: scan.select.value }),
+    ...source(),
     ...output(),
     ...(mode === "auto" ? {} : { mode }),
     ...(name.input.value.trim() === "" ? {} : { name: name.input.value.trim() }),
     priority: Number(priority.select.value),
+    ...(launcher.select.value === LOCAL ? {} : { launcher: launcher.select.value }),
   });
   let obstacle = "";
   let reason = "";
@@ -188,6 +239,7 @@ export function createJobForm(
       frames.element,
       way.element,
       priority.element,
+      launchers.length > 1 && launcher.element,
     ),
     hint,
     answer,

@@ -49,7 +49,11 @@ export function showJobsDialog(bus: Bus, client: ApiClient, store: SessionStore)
     body,
   );
   const fill = async (): Promise<void> => {
-    const [info, clouds] = await Promise.all([client.info(), client.clouds().catch(() => [])]);
+    const [info, clouds, uploads] = await Promise.all([
+      client.info(),
+      client.clouds().catch(() => []),
+      client.uploads().catch(() => []),
+    ]);
     if (!open) return;
     const refused = refusal(info);
     if (refused !== "") {
@@ -65,7 +69,12 @@ export function showJobsDialog(bus: Bus, client: ApiClient, store: SessionStore)
         empty.hidden = jobs.length > 0;
       },
     });
-    const form = createJobForm(client, store.document, clouds, (job) => list.take(job));
+    const form = createJobForm(
+      client,
+      store.document,
+      { clouds, uploads, launchers: info.launchers },
+      (job) => list.take(job),
+    );
     const refresh = (): void => {
       const { head } = store.document.history;
       const edits = head === 1 ? "The edit of this session is" : `The ${head} edits of this session are`;
