@@ -14,17 +14,17 @@ namespace pointwright {
 namespace {
 
 constexpr std::string_view kIndexHead = "file,sample_count,min_x,min_y,min_z,max_x,max_y,max_z";
-constexpr std::uint64_t kMostIndexBytes = std::uint64_t{1} << 28U;
+constexpr std::size_t kMostTiles = std::size_t{1} << 18U;
+constexpr std::uint64_t kMostIndexBytes = kMostTiles * 128;
+/// Of a tile's file: more than any attributes that a sample has, and what a few samples take at least.
+constexpr std::uint64_t kMostBytesOfSample = 1024;
+constexpr std::uint64_t kLeastTileBytes = std::uint64_t{1} << 20U;
 constexpr std::uint64_t kMostTileBytes = std::uint64_t{1} << 30U;
 
 Error malformed(std::string message) {
   return Error{.code = ErrorCode::kMalformedData,
                .message = std::move(message),
                .field = std::string(kDracoTilesIndex)};
-}
-
-std::span<const std::byte> as_bytes_of(const std::string& text) {
-  return std::as_bytes(std::span(text.data(), text.size()));
 }
 
 /// A line's fields between commas. Names have none.
@@ -49,24 +49,6 @@ bool parse_tile(std::string_view line, DracoTile& tile) {
       return false;
   }
   return tile.sample_count > 0 && (tile.min.array() <= tile.max.array()).all();
-}
-
-/// The samples of the cloud from `begin` on as a cloud of their own.
-Cloud part_of(const Cloud& cloud, std::uint32_t begin, std::uint32_t end) {
-  std::vector<std::uint32_t> order(end - begin);
-  for (std::uint32_t i = begin; i < end; ++i) order[i - begin] = i;
-  return permuted(cloud, order);
-}
-
-DracoTile tile_of(const Cloud& cloud, std::size_t k) {
-  DracoTile tile{.file = draco_tile_name(k), .sample_count = cloud.size()};
-  tile.min = tile.max = model_position(cloud, 0);
-  for (std::size_t i = 1; i < cloud.size(); ++i) {
-    const Vec3d p = model_position(cloud, i);
-    tile.min = tile.min.cwiseMin(p);
-    tile.max = tile.max.cwiseMax(p);
-  }
-  return tile;
 }
 
 /// Positions that float32 says as well become float32.
@@ -125,6 +107,11 @@ Result<std::vector<DracoTile>> parse_draco_tiles_index(std::string_view text, st
                    .field = std::string(kDracoTilesIndex),
                    .limit = static_cast<double>(max_samples)};
     samples += tile.sample_count;
+    if (tiles.size() == kMostTiles)
+      return Error{.code = ErrorCode::kTooLarge,
+                   .message = "the index names more than " + std::to_string(kMostTiles) + " tiles",
+                   .field = std::string(kDracoTilesIndex),
+                   .limit = static_cast<double>(kMostTiles)};
     if (!names.insert(tile.file).second)
       return malformed("line " + std::to_string(line.number) + " names " + quoted(tile.file) + " again");
     tiles.push_back(std::move(tile));
@@ -147,8 +134,8 @@ bool looks_like_draco_tiles(std::span<const std::byte> bytes) {
 }
 
 DracoTilesReader::DracoTilesReader(ZipReader zip, std::vector<DracoTile> tiles)
-    : zip_(std::move(zip)), tiles_(std::move(tiles)) {
-  for (std::size_t k = 0; k < tiles_.size(); ++k) unread_.emplace(tiles_[k].file, k);
+    : zip_(std::move(zip)), tiles_(std::move(tiles)), is_read_(tiles_.size(), false) {
+  for (std::size_t k = 0; k < tiles_.size(); ++k) places_.emplace(tiles_[k].file, k);
 }
 
 Result<DracoTilesReader> DracoTilesReader::open(std::span<const std::byte> bytes, std::uint64_t max_samples) {
@@ -183,16 +170,58 @@ Result<std::optional<DracoTilesReader::Piece>> DracoTilesReader::next() {
     const auto name = zip_.next();
     if (!name) return name.error();
     if (!name.value()) break;
-    const auto unread = unread_.find(*name.value());
-    if (unread == unread_.end()) continue;
-    auto content = zip_.content(kMostTileBytes);
+    const auto place = places_.find(*name.value());
+    if (place == places_.end()) continue;
+    const std::size_t tile = place->second;
+    if (is_read_[tile]) return malformed("the archive has " + quoted(*name.value()) + " twice");
+    const std::uint64_t samples = std::min(tiles_[tile].sample_count, kMostTileBytes);
+    auto content = zip_.content(std::min(kMostTileBytes, kLeastTileBytes + kMostBytesOfSample * samples));
     if (!content) return content.error();
-    const std::size_t tile = unread->second;
-    unread_.erase(unread);
+    is_read_[tile] = true;
     return std::optional(Piece{.tile = tile, .bytes = std::move(content).value()});
   }
-  if (unread_.empty()) return std::optional<Piece>();
-  return malformed("the archive has no " + quoted(unread_.begin()->first));
+  const auto missing = std::ranges::find(is_read_, false);
+  if (missing == is_read_.end()) return std::optional<Piece>();
+  return malformed("the archive has no " +
+                   quoted(tiles_[static_cast<std::size_t>(missing - is_read_.begin())].file));
+}
+
+Cloud part_of(const Cloud& cloud, std::uint32_t begin, std::uint32_t end) {
+  std::vector<std::uint32_t> order(end - begin);
+  for (std::uint32_t i = begin; i < end; ++i) order[i - begin] = i;
+  return permuted(cloud, order);
+}
+
+DracoTile draco_tile_of(const Cloud& cloud, std::string file) {
+  DracoTile tile{.file = std::move(file), .sample_count = cloud.size()};
+  tile.min = tile.max = model_position(cloud, 0);
+  for (std::size_t i = 1; i < cloud.size(); ++i) {
+    const Vec3d p = model_position(cloud, i);
+    tile.min = tile.min.cwiseMin(p);
+    tile.max = tile.max.cwiseMax(p);
+  }
+  return tile;
+}
+
+Result<void> write_draco_tiles_archive(
+    std::span<const DracoTile> tiles, std::span<const std::uint64_t> bytes,
+    const std::function<Result<std::vector<std::byte>>(std::size_t)>& content, const ByteSink& sink) {
+  const std::string index = draco_tiles_index(tiles);
+  std::vector<ZipEntry> entries;
+  entries.reserve(tiles.size() + 1);
+  entries.push_back({.name = std::string(kDracoTilesIndex), .bytes = index.size(), .content = [&index] {
+                       const auto text = std::as_bytes(std::span(index.data(), index.size()));
+                       return Result(std::vector<std::byte>(text.begin(), text.end()));
+                     }});
+  for (std::size_t k = 0; k < tiles.size(); ++k)
+    entries.push_back(
+        {.name = tiles[k].file, .bytes = bytes[k], .content = [&content, k] { return content(k); }});
+  return write_zip(entries, sink);
+}
+
+Error in_tile(Error error, const DracoTile& tile) {
+  error.message = quoted(tile.file) + ": " + error.message;
+  return error;
 }
 
 Result<std::vector<ScalarAttribute>> tile_columns(const Cloud& cloud, const DracoTile& tile) {
@@ -239,7 +268,7 @@ Result<ImportedCloud> read_draco_tiles(std::span<const std::byte> bytes, const I
     if (!piece.value()) break;
     const std::size_t k = piece.value()->tile;
     const auto decoded = read_draco(piece.value()->bytes, {.max_samples = tiles[k].sample_count});
-    if (!decoded) return decoded.error();
+    if (!decoded) return in_tile(decoded.error(), tiles[k]);
     is_double = is_double || decoded.value().cloud.position_is_double;
     report.encoding = decoded.value().report.encoding;
     report.from_mesh = report.from_mesh || decoded.value().report.from_mesh;
@@ -269,31 +298,24 @@ Result<std::vector<std::byte>> write_draco_tiles(const Cloud& cloud, int positio
   const auto count = static_cast<std::uint32_t>(cloud.size());
   std::vector<DracoTile> tiles;
   std::vector<std::vector<std::byte>> files;
+  std::vector<std::uint64_t> sizes;
   for (std::uint32_t begin = 0; begin < count;) {
     const std::uint32_t end = count - begin > kMostTileSamples ? begin + kMostTileSamples : count;
     const Cloud part = part_of(cloud, begin, end);
     auto file = write_draco(ExportView(part, false), position_bits);
     if (!file) return file.error();
-    tiles.push_back(tile_of(part, tiles.size()));
+    tiles.push_back(draco_tile_of(part, draco_tile_name(tiles.size())));
+    sizes.push_back(file.value().size());
     files.push_back(std::move(file).value());
     begin = end;
   }
-  const std::string index = draco_tiles_index(tiles);
-  std::vector<ZipEntry> entries;
-  entries.reserve(tiles.size() + 1);
-  entries.push_back({.name = std::string(kDracoTilesIndex), .bytes = index.size(), .content = [&] {
-                       const auto bytes = as_bytes_of(index);
-                       return Result(std::vector<std::byte>(bytes.begin(), bytes.end()));
-                     }});
-  for (std::size_t k = 0; k < tiles.size(); ++k)
-    entries.push_back({.name = tiles[k].file, .bytes = files[k].size(), .content = [&files, k] {
-                         return Result(std::move(files[k]));
-                       }});
   std::vector<std::byte> archive;
-  const auto written = write_zip(entries, [&](std::span<const std::byte> bytes) {
-    archive.insert(archive.end(), bytes.begin(), bytes.end());
-    return true;
-  });
+  const auto written = write_draco_tiles_archive(
+      tiles, sizes, [&](std::size_t k) { return Result(std::move(files[k])); },
+      [&](std::span<const std::byte> bytes) {
+        archive.insert(archive.end(), bytes.begin(), bytes.end());
+        return true;
+      });
   if (!written) return written.error();
   return archive;
 }

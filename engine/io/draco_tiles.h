@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -39,7 +40,8 @@ std::string draco_tile_name(std::size_t k);
 /// tile.
 std::string draco_tiles_index(std::span<const DracoTile> tiles);
 
-/// Errors: kMalformedData (with the line), kEmptyCloud, kTooLarge where the tiles claim more samples
+/// Errors: kMalformedData (with the line), kEmptyCloud, kTooLarge where the tiles claim more samples or are
+///         more than 2^18
 Result<std::vector<DracoTile>> parse_draco_tiles_index(std::string_view text, std::uint64_t max_samples);
 
 /// Whether the bytes begin as such an archive does.
@@ -59,7 +61,8 @@ class DracoTilesReader {
     std::vector<std::byte> bytes;  ///< a Draco file
   };
   /// Every tile once, in the order of their places in the archive; nullopt behind the last.
-  /// Errors: those of ZipReader; kMalformedData where a tile of the index is missing
+  /// Errors: those of ZipReader; kMalformedData where a tile of the index is missing or there twice; kTooLarge
+  ///         beyond 1 KiB a sample
   Result<std::optional<Piece>> next();
 
  private:
@@ -67,8 +70,23 @@ class DracoTilesReader {
 
   ZipReader zip_;
   std::vector<DracoTile> tiles_;
-  std::map<std::string, std::size_t> unread_;  // the tiles' places, by name
+  std::map<std::string, std::size_t> places_;  // the tiles', by name
+  std::vector<bool> is_read_;
 };
+
+/// The samples begin .. end - 1 as a cloud of their own.
+Cloud part_of(const Cloud& cloud, std::uint32_t begin, std::uint32_t end);
+
+/// The tile that this cloud is. Pre: not empty
+DracoTile draco_tile_of(const Cloud& cloud, std::string file);
+
+/// The archive of these tiles, whose files have so many bytes each. Errors: those of write_zip()
+Result<void> write_draco_tiles_archive(
+    std::span<const DracoTile> tiles, std::span<const std::uint64_t> bytes,
+    const std::function<Result<std::vector<std::byte>>(std::size_t)>& content, const ByteSink& sink);
+
+/// The error of a tile's file, which then names it.
+Error in_tile(Error error, const DracoTile& tile);
 
 /// The tile's samples as named columns in the file's order: x, y and z as float64 in model space, then what
 /// else its cloud holds.

@@ -179,6 +179,9 @@ class AsciiBody {
   // The vertices' rows have exactly the values that the header promises.
   Result<void> read(const PlyElement& element, Table& table) {
     if (auto fits = check_length(element); !fits) return fits;
+    return read_rows(element, table);
+  }
+  Result<void> read_rows(const PlyElement& element, Table& table) {
     for (std::uint64_t row = 0; row < element.count; ++row) {
       skip_blank_lines();
       if (at_ == end_) return too_few(element);
@@ -396,9 +399,13 @@ Result<std::vector<ScalarAttribute>> read_ply_rows(std::string_view text, const 
   PlyElement element = *header.vertex();
   element.count = count;
   AsciiBody body(text, {.data_offset = 0, .line_count = first_line - 1, .line_end = header.line_end});
-  if (auto fits = body.check_length(element); !fits) return fits.error();
+  // The rows were counted, so it is one of them that is too short. No more is allocated than the text could
+  // fill, and that row is among those.
+  const auto fits = body.check_length(element);
+  if (!fits) element.count = std::min<std::uint64_t>(count, text.size() / 2 / element.properties.size() + 2);
   Table table = make_table(element);
-  if (auto done = body.read(element, table); !done) return done.error();
+  if (auto done = body.read_rows(element, table); !done) return done.error();
+  if (!fits) return fits.error();
   return std::move(table.columns);
 }
 

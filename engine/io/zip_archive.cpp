@@ -94,8 +94,10 @@ Result<std::optional<std::string>> ZipReader::next() {
   const int status = is_at_end_ ? ARCHIVE_EOF : archive_read_next_header(archive_.get(), &entry);
   is_at_end_ = status == ARCHIVE_EOF;
   if (is_at_end_) return std::optional<std::string>();
-  if (status != ARCHIVE_OK) return malformed(archive_.get(), {});
-  const char* const name = archive_entry_pathname(entry);
+  // A warning is of a name that this locale cannot say: nobody asks for that file.
+  if (status != ARCHIVE_OK && status != ARCHIVE_WARN) return malformed(archive_.get(), {});
+  const char* name = archive_entry_pathname_utf8(entry);
+  if (name == nullptr) name = archive_entry_pathname(entry);
   name_ = name == nullptr ? std::string() : std::string(name);
   return std::optional(name_);
 }

@@ -143,10 +143,10 @@ void bound_memory(std::uint64_t bytes) {
 /// Runs work() -> Outcome<T> with so many threads; memory that is not there is a problem like others.
 template <typename Work>
 auto with_memory(int threads, Work work) -> decltype(work()) {
-  decltype(work()) outcome = protocol::Problem{
-      .kind = protocol::ProblemKind::kOutOfSpace,
-      .detail =
-          "there is not enough memory for this job in this mode; in tiles it takes as much as it is given"};
+  decltype(work()) outcome = protocol::Problem{.kind = protocol::ProblemKind::kOutOfSpace,
+                                               .detail =
+                                                   "there is not enough memory for this job: in tiles, of "
+                                                   "files that can be cut, it keeps to --memory"};
   try {
     with_threads(threads, [&] { outcome = work(); });
   } catch (const std::bad_alloc&) {

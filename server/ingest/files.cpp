@@ -1,6 +1,7 @@
 #include "server/ingest/files.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -79,6 +80,7 @@ Result<void> fill_file_atomically(const std::string& path, const std::function<R
   {
     Descriptor file(open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
     if (!file.is_open()) return file_error("cannot create", temporary, errno);
+    static_cast<void>(flock(file.get(), LOCK_EX | LOCK_NB));  // nobody takes it for a leftover
     const Result<bool> filled = fill(file.get());
     const bool is_written = filled && filled.value() && fsync(file.get()) == 0;
     if (!is_written || rename(temporary.c_str(), path.c_str()) != 0) {
@@ -102,6 +104,29 @@ Result<void> copy_file_atomically(const std::string& path, int file, std::uint64
   });
 }
 
+namespace {
+
+/// "PROCESS-NUMBER" of temporary_name(), of a process that is no more.
+bool is_leftover(std::string_view text) {
+  pid_t writer = 0;
+  unsigned number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [dash, error] = std::from_chars(text.data(), end, writer);
+  if (error != std::errc() || writer <= 0 || dash == end || *dash != '-') return false;
+  const auto [last, wrong] = std::from_chars(dash + 1, end, number);
+  return wrong == std::errc() && last == end && kill(writer, 0) != 0 && errno == ESRCH;
+}
+
+/// Whether it is no regular file, or somebody writes it: on another machine, perhaps.
+bool is_held(const std::string& path) {
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  struct stat info {};
+  return !file.is_open() || fstat(file.get(), &info) != 0 || !S_ISREG(info.st_mode) ||
+         flock(file.get(), LOCK_EX | LOCK_NB) != 0;
+}
+
+}  // namespace
+
 void remove_leftovers(const std::string& path) {
   const std::string start = std::filesystem::path(path).filename().string().append(kTemporary);
   std::vector<std::filesystem::path> left;
@@ -109,11 +134,8 @@ void remove_leftovers(const std::string& path) {
   for (const auto& entry : std::filesystem::directory_iterator(folder_of(path), none)) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(start)) continue;
-    pid_t writer = 0;
-    const char* const end = name.data() + name.size();
-    const auto [next, error] = std::from_chars(name.data() + start.size(), end, writer);
-    const bool is_ours = error == std::errc() && writer > 0 && next != end && *next == '-';
-    if (is_ours && kill(writer, 0) != 0 && errno == ESRCH) left.push_back(entry.path());
+    if (is_leftover(name.substr(start.size())) && !is_held(entry.path().string()))
+      left.push_back(entry.path());
   }
   for (const auto& each : left) std::filesystem::remove(each, none);
 }

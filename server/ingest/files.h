@@ -33,8 +33,8 @@ Result<void> fill_file_atomically(const std::string& path, const std::function<R
 /// The same with the first `size` bytes of an open file, piece by piece.
 Result<void> copy_file_atomically(const std::string& path, int file, std::uint64_t size);
 
-/// Deletes what writers of `path` left beside it when they were killed: the files of processes that are no
-/// more on this machine.
+/// Deletes what writers of `path` left beside it when they were killed: files with their names, of processes
+/// that are not there and that nobody holds.
 void remove_leftovers(const std::string& path);
 
 /// Calls take(piece) for every piece of an open file's first `size` bytes, in order, wherever its offset

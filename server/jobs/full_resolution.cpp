@@ -68,7 +68,8 @@ class MemoryJob {
       preview = std::move(made).value();
     }
     const ImportReport& found = imported.value().report;
-    if (auto elsewhere = check_preview(*preview, found.bounds_min, found.bounds_max)) return *elsewhere;
+    if (params_.preview != nullptr)
+      if (auto elsewhere = check_preview(*preview, found.bounds_min, found.bounds_max)) return *elsewhere;
     report_.preview_samples = preview->size();
     const auto levels = hierarchy_for(params_.request.recipe, *preview, params_.neighbors);
     if (!levels.ok()) return levels.problem();
@@ -223,8 +224,10 @@ class TileRun {
     }
     const std::string path = params_.folder + "/" + ScratchFolder::kScanName;
     if (auto problem = unpack_scan(params_, *chosen_.file, *chosen_.packed, path, team_, context_,
-                                   part_of_progress(0.0, kUnpacking)))
+                                   part_of_progress(0.0, kUnpacking))) {
+      if (team_.leads()) folder_.drop_scan();
       return problem;
+    }
     auto file = MappedFile::open(path);
     auto records =
         file ? ScanRecords::of(file.value().bytes()) : Result<std::optional<ScanRecords>>(file.error());
@@ -259,8 +262,8 @@ class TileRun {
       if (keeps && !is_changed[k])
         problem = team_.agree(team_.leads() ? copy_scan(output) : std::nullopt);
       else if (chosen_.packs)
-        problem = pack_result(made[k], output, params_.folder + "/tiles.packed", params_.memory_bytes, team_,
-                              context_, part_of_progress(kPacking, 1.0));
+        problem = pack_result(made[k], output, params_.folder + "/" + ScratchFolder::kPackedFolder,
+                              params_.memory_bytes, team_, context_, part_of_progress(kPacking, 1.0));
       if (problem) return problem;
       std::error_code none;
       if (chosen_.packs && team_.leads()) std::filesystem::remove(made[k], none);

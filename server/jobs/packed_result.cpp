@@ -33,7 +33,7 @@ using protocol::ProblemKind;
 constexpr std::uint64_t kSurveyed = 200'000;  // samples that tiles are cut by
 constexpr std::size_t kTilesAtOnce = 2;
 /// Of a sample while its tile is written: record, columns, the encoder's.
-constexpr std::uint64_t kBytesOfSample = 500;
+constexpr std::uint64_t kBytesOfPackedSample = 500;
 constexpr std::uint64_t kLeastTileSamples = 4096;
 
 class Packer {
@@ -61,6 +61,7 @@ class Packer {
   /// A tile as its encoder knows it; so it goes to the others.
   struct Encoded {
     std::uint64_t tile = 0;
+    std::uint64_t part = 0;  // of a tile whose samples could not be parted: they stand in one place
     std::uint64_t samples = 0;
     std::uint64_t bytes = 0;  // of its file
     Vec3d min = Vec3d::Zero();
@@ -73,7 +74,8 @@ class Packer {
       return team_.agree(problem);
     if (auto any = team_.agree(std::nullopt)) return any;
     const Cloud candidates = chosen_cloud(found.value());
-    const std::uint64_t most = std::clamp<std::uint64_t>(memory_bytes / (kTilesAtOnce * kBytesOfSample),
+    const std::uint64_t bytes_each = kBytesOfPackedSample + 3 * records_.record_bytes;
+    const std::uint64_t most = std::clamp<std::uint64_t>(memory_bytes / (kTilesAtOnce * bytes_each),
                                                          kLeastTileSamples, kMostTileSamples);
     const double share = static_cast<double>(candidates.size()) / static_cast<double>(records_.count);
     const auto most_candidates = static_cast<std::size_t>(std::max(1.0, share * static_cast<double>(most)));
@@ -105,7 +107,7 @@ class Packer {
         const auto encoded = encode(tile);
         const std::lock_guard lock(mutex);
         if (encoded)
-          encoded_.push_back(encoded.value());
+          encoded_.insert(encoded_.end(), encoded.value().begin(), encoded.value().end());
         else if (!failure)
           failure = protocol::to_problem(encoded.error());
       }
@@ -114,25 +116,33 @@ class Packer {
     return failure;
   }
 
-  [[nodiscard]] std::string path_of(std::uint64_t tile) const {
-    return folder_ + "/tile-" + std::to_string(tile) + ".packed";
+  [[nodiscard]] std::string path_of(const Encoded& encoded) const {
+    return folder_ + "/tile-" + std::to_string(encoded.tile) + "-" + std::to_string(encoded.part) + ".packed";
   }
 
-  Result<Encoded> encode(std::size_t tile) const {
+  Result<std::vector<Encoded>> encode(std::size_t tile) const {
     if (context_.is_cancelled()) return cancelled_error();
     auto cloud = cloud_of(tile);
     if (!cloud) return cloud.error();
-    const auto bytes = write_cloud(cloud.value(), CloudFormat::kDraco, {.caller_order = false});
-    if (!bytes) return bytes.error();
-    Encoded encoded{.tile = tile, .samples = cloud.value().size(), .bytes = bytes.value().size()};
-    encoded.min = encoded.max = model_position(cloud.value(), 0);
-    for (std::size_t i = 1; i < cloud.value().size(); ++i) {
-      const Vec3d p = model_position(cloud.value(), i);
-      encoded.min = encoded.min.cwiseMin(p);
-      encoded.max = encoded.max.cwiseMax(p);
+    std::vector<Encoded> all;
+    const auto count = static_cast<std::uint32_t>(cloud.value().size());
+    for (std::uint32_t begin = 0; begin < count;) {
+      const std::uint32_t end = count - begin > kMostTileSamples ? begin + kMostTileSamples : count;
+      const Cloud part = part_of(cloud.value(), begin, end);
+      const auto bytes = write_cloud(part, CloudFormat::kDraco, {.caller_order = false});
+      if (!bytes) return bytes.error();
+      const DracoTile box = draco_tile_of(part, {});
+      all.push_back({.tile = tile,
+                     .part = all.size(),
+                     .samples = box.sample_count,
+                     .bytes = bytes.value().size(),
+                     .min = box.min,
+                     .max = box.max});
+      if (auto written = write_file_atomically(path_of(all.back()), bytes.value()); !written)
+        return written.error();
+      begin = end;
     }
-    if (auto written = write_file_atomically(path_of(tile), bytes.value()); !written) return written.error();
-    return encoded;
+    return all;
   }
 
   /// The tile's samples in coherent order, as a reader of the file would have them.
@@ -161,7 +171,7 @@ class Packer {
       all.insert(all.end(), theirs.begin(), theirs.end());
     }
     encoded_ = std::move(all);
-    std::ranges::sort(encoded_, {}, &Encoded::tile);
+    std::ranges::sort(encoded_, {}, [](const Encoded& each) { return std::pair(each.tile, each.part); });
   }
 
   Result<void> write_archive(const std::string& output) const {
@@ -172,23 +182,17 @@ class Packer {
                        .sample_count = each.samples,
                        .min = each.min,
                        .max = each.max});
-    const std::string index = draco_tiles_index(tiles);
-    std::vector<ZipEntry> entries;
-    entries.reserve(tiles.size() + 1);
-    entries.push_back({.name = std::string(kDracoTilesIndex), .bytes = index.size(), .content = [&] {
-                         const auto bytes = std::as_bytes(std::span(index.data(), index.size()));
-                         return Result(std::vector<std::byte>(bytes.begin(), bytes.end()));
-                       }});
-    for (std::size_t k = 0; k < tiles.size(); ++k)
-      entries.push_back({.name = tiles[k].file, .bytes = encoded_[k].bytes, .content = [this, k] {
-                           return read_file(path_of(encoded_[k].tile), encoded_[k].bytes);
-                         }});
+    std::vector<std::uint64_t> sizes;
+    sizes.reserve(encoded_.size());
+    for (const Encoded& each : encoded_) sizes.push_back(each.bytes);
+    const auto content = [&](std::size_t k) { return read_file(path_of(encoded_[k]), encoded_[k].bytes); };
     return fill_file_atomically(output, [&](int out) -> Result<bool> {
       int failure = 0;  // errno
-      const auto written = write_zip(entries, [&](std::span<const std::byte> bytes) {
-        if (!write_all(out, bytes)) failure = errno;
-        return failure == 0;
-      });
+      const auto written =
+          write_draco_tiles_archive(tiles, sizes, content, [&](std::span<const std::byte> bytes) {
+            if (!write_all(out, bytes)) failure = errno;
+            return failure == 0;
+          });
       if (written) return true;
       if (failure == 0) return written.error();
       errno = failure;

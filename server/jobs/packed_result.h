@@ -20,7 +20,7 @@ std::uint64_t packing_bytes(std::uint64_t samples, std::uint64_t record_bytes);
 /// go to `folder`, made where it is not there and removed in the end. Done by all of a team, each its tiles;
 /// the archive is the leader's.
 /// Problems:    those of reading and of writing, cancelled
-/// Cost:        three passes over the samples, in memory of a few tiles
+/// Cost:        three passes over the samples, in memory of two tiles; what stands in one place is one tile's
 /// Determinism: the same bytes for any number of threads and of a team; memory_bytes says how large tiles are
 std::optional<protocol::Problem> pack_result(const std::string& made, const std::string& output,
                                              const std::string& folder, std::uint64_t memory_bytes,

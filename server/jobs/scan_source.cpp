@@ -114,14 +114,24 @@ Outcome<ChosenMode> choose_mode(const JobParams& params) {
   const bool is_ply = packed.value() || (records.value() && records.value()->format == CloudFormat::kPly);
   const bool fits = is_ply ? packs || wanted.value() == CloudFormat::kPly
                            : records.value() && records.value()->format == wanted.value();
+  // Tiles take every sample that there is.
+  const bool drops = is_ply && params.drop_non_finite && !params.mode;
+  const std::uint64_t least = packed.value() ? packed.value()->least_memory() : 0;
+  const bool has_room = least <= params.memory_bytes;
   const bool can_grow = !records.value() || records.value()->can_grow();
-  if (fits && (can_grow || !resamples(params.request)))
+  if (fits && !drops && has_room && (can_grow || !resamples(params.request)))
     return ChosenMode{.mode = JobMode::kTiles,
                       .file = std::move(file).value(),
                       .records = std::move(records).value(),
                       .packed = packed.value(),
                       .packs = packs};
   if (!params.mode) return ChosenMode{.mode = JobMode::kMemory};
+  if (fits && !has_room)
+    return Problem{.kind = ProblemKind::kOutOfSpace,
+                   .detail = "a tile of " + std::to_string(packed.value()->most_of_tile) +
+                             " samples takes more memory than the job may have: cut it into smaller ones",
+                   .limit = static_cast<double>(params.memory_bytes),
+                   .actual = static_cast<double>(least)};
   if (fits)
     return invalid(
         "the file holds faces or other elements, which count its samples: with resampling use the mode "

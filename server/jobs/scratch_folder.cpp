@@ -23,7 +23,34 @@ std::optional<Problem> ScratchFolder::take(const std::string& path, Team& team) 
     problem = Problem{.kind = ProblemKind::kStorageFailed, .detail = path + ": " + error.message()};
   else if (team.leads())
     problem = lock();
+  if (team.leads() && !problem) clear_unfinished();
   return team.agree(problem);
+}
+
+void ScratchFolder::clear_unfinished() const {
+  std::error_code none;
+  clear_packed(path_);
+  std::vector<std::filesystem::path> unfinished;
+  for (const auto& entry : std::filesystem::directory_iterator(path_, none)) {
+    const std::string name = entry.path().filename().string();
+    const bool is_whole = name.find(".new-") == std::string::npos && !name.starts_with("edited");
+    if (is_ours(entry.path()) && !is_whole) unfinished.push_back(entry.path());
+  }
+  for (const auto& each : unfinished) std::filesystem::remove(each, none);
+}
+
+void ScratchFolder::drop_scan() const {
+  std::error_code none;
+  std::filesystem::remove(std::filesystem::path(path_) / kScanName, none);
+  std::filesystem::remove(path_, none);
+}
+
+void ScratchFolder::clear_packed(const std::string& path) {
+  std::error_code none;
+  const std::filesystem::path packed = std::filesystem::path(path) / kPackedFolder;
+  if (!std::filesystem::is_directory(packed, none)) return;
+  clear(packed.string());
+  std::filesystem::remove(packed, none);
 }
 
 std::optional<Problem> ScratchFolder::lock() {
@@ -51,6 +78,7 @@ bool ScratchFolder::is_ours(const std::filesystem::path& path) {
 }
 
 void ScratchFolder::clear(const std::string& path) {
+  clear_packed(path);
   TileStore::clear(path);
   std::error_code none;
   std::vector<std::filesystem::path> ours;

@@ -25,6 +25,9 @@ namespace pointwright::server {
 namespace {
 
 constexpr std::uint64_t kChunkSamples = std::uint64_t{1} << 21U;  // that are sorted together
+/// Where their records go along.
+constexpr std::uint64_t kChunkRecordBytes = std::uint64_t{1} << 26U;
+constexpr std::uint64_t kLeastChunkSamples = std::uint64_t{1} << 14U;
 constexpr std::size_t kChunksAtOnce = 2;
 constexpr std::uint64_t kIndexMagic = 0x32584449'54575054ULL;
 constexpr std::uint64_t kResultMagic = 0x32534552'54575054ULL;
@@ -192,10 +195,13 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
   // Nobody leaves before all have met below.
   std::atomic<int> failure{spool.is_open() ? 0 : errno};
   const Descriptor whole = with_records ? opened(records_path(folder_), O_WRONLY | O_CREAT) : Descriptor();
-  if (with_records && !whole.is_open()) failure = errno;
+  std::atomic<int> records_failure{with_records && !whole.is_open() ? errno : 0};
   const std::byte* const first = file.bytes().data() + records.begin;
   // Every chunk has its place in the spool, so they may be sorted and written side by side.
-  const auto chunks = static_cast<std::size_t>((records.count + kChunkSamples - 1) / kChunkSamples);
+  const std::uint64_t chunk_samples =
+      with_records ? std::clamp(kChunkRecordBytes / records.record_bytes, kLeastChunkSamples, kChunkSamples)
+                   : kChunkSamples;
+  const auto chunks = static_cast<std::size_t>((records.count + chunk_samples - 1) / chunk_samples);
   std::vector<std::vector<std::pair<std::uint32_t, Extent>>> extents(chunks);
   std::atomic<std::size_t> next{0};
   const auto sort_chunks = [&] {
@@ -205,9 +211,9 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
     std::vector<std::size_t> place(cuts_.cell_count() + 1);
     for (std::size_t chunk = next++; chunk < chunks; chunk = next++) {
       if (!team.takes(chunk)) continue;
-      if (context.is_cancelled() || failure != 0) return;
-      const std::uint64_t begin = chunk * kChunkSamples;
-      const auto count = static_cast<std::size_t>(std::min(kChunkSamples, records.count - begin));
+      if (context.is_cancelled() || failure != 0 || records_failure != 0) return;
+      const std::uint64_t begin = chunk * chunk_samples;
+      const auto count = static_cast<std::size_t>(std::min(chunk_samples, records.count - begin));
       const auto place_of_record = [&](const std::byte* record) {
         // At origin 0 the cast alone keeps a negative zero.
         const Vec3d p = records.position(record);
@@ -241,7 +247,7 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
         bytes.resize(count * each);
         for (std::size_t i = 0; i < count; ++i)
           std::memcpy(bytes.data() + i * each, first + sorted[i].index * each, each);
-        if (!write_all_at(whole.get(), bytes, begin * each)) failure = errno;
+        if (!write_all_at(whole.get(), bytes, begin * each)) records_failure = errno;
       }
       file.release(records.begin + begin * records.record_bytes,
                    records.begin + (begin + count) * records.record_bytes);
@@ -250,6 +256,7 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
   parallel_for(
       kChunksAtOnce, [&](std::size_t, std::size_t) { sort_chunks(); }, 1);
   if (failure == 0 && ::fsync(spool.get()) != 0) failure = errno;
+  if (with_records && records_failure == 0 && ::fsync(whole.get()) != 0) records_failure = errno;
   struct Placed {
     std::uint64_t cell = 0;
     Extent extent;
@@ -267,6 +274,7 @@ Result<void> TileStore::sort(const MappedFile& file, const ScanRecords& records,
   for (auto& list : extents_) std::ranges::sort(list, {}, &Extent::first);
   if (context.is_cancelled()) return cancelled_error();
   if (failure != 0) return file_error("cannot write", path, failure);
+  if (records_failure != 0) return file_error("cannot write", records_path(folder_), records_failure);
   return {};
 }
 

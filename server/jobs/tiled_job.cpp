@@ -149,7 +149,8 @@ class TiledJob {
       if (!made) return protocol::to_problem(made.error());
       preview_ = std::move(made).value();
     }
-    if (auto elsewhere = check_preview(*preview_, surveyed_.min, surveyed_.max)) return elsewhere;
+    if (params_.preview != nullptr)
+      if (auto elsewhere = check_preview(*preview_, surveyed_.min, surveyed_.max)) return elsewhere;
     report_.preview_samples = preview_->size();
     const auto levels = hierarchy_for(params_.request.recipe, *preview_, params_.neighbors);
     if (!levels.ok()) return levels.problem();
@@ -466,7 +467,13 @@ std::optional<Problem> check_preview(const Cloud& preview, const Vec3d& min, con
   const Box3f box = bounds_of(preview.position);
   const Vec3d from = preview.origin + box.min.cast<double>();
   const Vec3d to = preview.origin + box.max.cast<double>();
-  if ((from.array() <= max.array()).all() && (to.array() >= min.array()).all()) return std::nullopt;
+  // Its file may have rounded what the scan's has not.
+  constexpr double kOfCoordinates = 1e-6;
+  constexpr double kOfExtent = 0.01;
+  const double farthest = std::max(min.cwiseAbs().maxCoeff(), max.cwiseAbs().maxCoeff());
+  const Vec3d room = Vec3d::Constant(kOfCoordinates * farthest + kOfExtent * (max - min).norm());
+  if ((from.array() <= (max + room).array()).all() && (to.array() >= (min - room).array()).all())
+    return std::nullopt;
   return Problem{.kind = ProblemKind::kInvalidValue,
                  .detail = "the preview stands elsewhere than the scan: it is of another one"};
 }

@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -35,7 +34,12 @@ using protocol::ProblemKind;
 
 constexpr std::uint64_t kTextPiece = std::uint64_t{1} << 22U;  // bytes that are read together
 constexpr std::size_t kPiecesAtOnce = 2;
-constexpr std::uint64_t kMostSamples = std::numeric_limits<std::uint64_t>::max() / 4096;
+constexpr std::uint64_t kMostSamples = std::uint64_t{1}
+                                       << 40U;  // whose bytes can be counted, whatever they hold
+/// Of a tile's sample while it is decoded: the decoder's, columns twice, the row.
+constexpr std::uint64_t kBytesOfTileSample = 300;
+/// No tile is refused for less.
+constexpr std::uint64_t kUsualMemory = std::uint64_t{128} << 20U;
 
 /// Rows of the unpacked scan.
 struct Rows {
@@ -77,8 +81,10 @@ class Pieces {
   virtual ~Pieces() = default;
   [[nodiscard]] virtual const std::vector<PlyProperty>& properties() const = 0;
   [[nodiscard]] virtual std::size_t count() const = 0;
-  /// The rows of a piece that this process has to do; nullopt: there are none left. Any thread.
-  virtual Result<std::optional<Rows>> next(const Team& team) = 0;
+  /// The rows of a piece that this process has to do; nullopt: there are none left. Any thread. `piece`: its
+  /// place among them, also where there is an error.
+  virtual Result<std::optional<Rows>> next(const Team& team, std::size_t& piece) = 0;
+  [[nodiscard]] virtual std::size_t at_once() const { return kPiecesAtOnce; }
 };
 
 /// Lines of text: cut at their ends, their rows counted first.
@@ -99,9 +105,10 @@ class TextPieces final : public Pieces {
 
   [[nodiscard]] const std::vector<PlyProperty>& properties() const override { return properties_; }
   [[nodiscard]] std::size_t count() const override { return pieces_.size(); }
-  Result<std::optional<Rows>> next(const Team& team) override {
+  Result<std::optional<Rows>> next(const Team& team, std::size_t& place) override {
     std::size_t k = next_++;
     while (k < pieces_.size() && !team.takes(k)) k = next_++;
+    place = k;
     if (k >= pieces_.size()) return std::optional<Rows>();
     const Piece& piece = pieces_[k];
     const std::uint64_t count = header_.vertex()->count;
@@ -223,19 +230,26 @@ class TilePieces final : public Pieces {
       auto piece = first.value().next();
       if (!piece) return protocol::to_problem(piece.error());
       if (!piece.value() || piece.value()->tile != 0) continue;
-      auto columns = pieces->columns_of(*piece.value());
+      const auto columns = pieces->columns_of(*piece.value());
       if (!columns) return protocol::to_problem(columns.error());
-      pieces->set_layout(std::move(columns).value());
+      pieces->set_layout(columns.value());
       return std::unique_ptr<Pieces>(std::move(pieces));
     }
   }
 
   [[nodiscard]] const std::vector<PlyProperty>& properties() const override { return properties_; }
   [[nodiscard]] std::size_t count() const override { return reader_.tiles().size(); }
-  Result<std::optional<Rows>> next(const Team& team) override {
+  [[nodiscard]] std::size_t at_once() const override {
+    const std::uint64_t largest =
+        std::ranges::max(reader_.tiles(), {}, &DracoTile::sample_count).sample_count;
+    const std::uint64_t memory = std::max(params_.memory_bytes, kUsualMemory);
+    return kPiecesAtOnce * kBytesOfTileSample * largest <= memory ? kPiecesAtOnce : 1;
+  }
+  Result<std::optional<Rows>> next(const Team& team, std::size_t& place) override {
     std::optional<DracoTilesReader::Piece> piece;
     {
       const std::lock_guard lock(mutex_);
+      place = taken_++;
       do {
         auto taken = reader_.next();
         if (!taken) return taken.error();
@@ -267,15 +281,11 @@ class TilePieces final : public Pieces {
     const auto decoded = params_.confined ? decode_confined(piece.bytes, CloudFormat::kDraco, import,
                                                             confinement(params_, piece.bytes.size()))
                                           : decode_cloud(piece.bytes, CloudFormat::kDraco, import);
-    if (!decoded) {
-      Error error = decoded.error();
-      error.message = pointwright::quoted(tile.file) + ": " + error.message;
-      return error;
-    }
+    if (!decoded) return in_tile(decoded.error(), tile);
     return tile_columns(decoded.value().cloud, tile);
   }
 
-  void set_layout(std::vector<ScalarAttribute> columns) {
+  void set_layout(const std::vector<ScalarAttribute>& columns) {
     for (const ScalarAttribute& column : columns) {
       properties_.push_back({.name = column.name, .type = type_of(column)});
       layout_.push_back({.name = column.name, .values = make_values(type_of(column))});
@@ -284,8 +294,9 @@ class TilePieces final : public Pieces {
 
   const JobParams& params_;
   const MappedFile& file_;
-  std::mutex mutex_;  // guards the reader
+  std::mutex mutex_;  // guards the reader and the count
   DracoTilesReader reader_;
+  std::size_t taken_ = 0;
   std::vector<std::uint64_t> first_;  // rows before each tile
   std::vector<PlyProperty> properties_;
   std::vector<ScalarAttribute> layout_;  // without values
@@ -295,7 +306,11 @@ std::optional<Problem> check_room(const std::string& to, std::uint64_t bytes) {
   struct statvfs room {};
   const std::string folder = std::filesystem::path(to).parent_path().string();
   if (::statvfs(folder.c_str(), &room) != 0) return std::nullopt;  // then writing says why
-  const std::uint64_t free = static_cast<std::uint64_t>(room.f_bavail) * room.f_frsize;
+  // What an interrupted job has left of it makes room.
+  std::error_code none;
+  const std::uint64_t there = std::filesystem::file_size(to, none);
+  const std::uint64_t free =
+      static_cast<std::uint64_t>(room.f_bavail) * room.f_frsize + (none ? std::uint64_t{0} : there);
   if (free >= bytes) return std::nullopt;
   return Problem{.kind = ProblemKind::kOutOfDisk,
                  .detail = "the scan takes " + std::to_string(bytes >> 20U) + " MiB once it is unpacked",
@@ -314,27 +329,31 @@ std::optional<Problem> write_pieces(Pieces& pieces, SharedFile& out, std::uint64
                                     const std::string& to, const Team& team, const ExecutionContext& context,
                                     const JobProgress& progress) {
   std::optional<Problem> problem;
+  std::size_t failed = 0;  // the first piece that did: the same for any number of threads
   std::size_t done = 0;
-  std::mutex mutex;  // guards both and the progress
+  std::mutex mutex;  // guards these and the progress
   const std::uint64_t bytes_each = row_bytes(pieces.properties());
-  const auto fail = [&](const Error& error) {
+  const auto fail = [&](std::size_t piece, const Error& error) {
     const std::lock_guard lock(mutex);
-    if (!problem) problem = protocol::to_problem(error);
+    if (problem && failed <= piece) return;
+    problem = protocol::to_problem(error);
+    failed = piece;
   };
   parallel_for(
-      kPiecesAtOnce,
+      pieces.at_once(),
       [&](std::size_t, std::size_t) {
         while (true) {
           {
             const std::lock_guard lock(mutex);
             if (problem) return;
           }
-          if (context.is_cancelled()) return fail(cancelled_error());
-          const auto rows = pieces.next(team);
-          if (!rows) return fail(rows.error());
+          if (context.is_cancelled()) return fail(0, cancelled_error());
+          std::size_t piece = 0;
+          const auto rows = pieces.next(team, piece);
+          if (!rows) return fail(piece, rows.error());
           if (!rows.value()) return;
           if (!out.write_at(rows.value()->bytes, head + rows.value()->first * bytes_each))
-            return fail(file_error("cannot write", to, errno));
+            return fail(piece, file_error("cannot write", to, errno));
           const std::lock_guard lock(mutex);
           done += static_cast<std::size_t>(team.size());
           progress("unpacking",
@@ -347,6 +366,11 @@ std::optional<Problem> write_pieces(Pieces& pieces, SharedFile& out, std::uint64
 
 }  // namespace
 
+std::uint64_t PackedScan::least_memory() const {
+  const std::uint64_t needed = kBytesOfTileSample * most_of_tile;
+  return needed <= kUsualMemory ? 0 : needed;
+}
+
 Result<std::optional<PackedScan>> packed_scan(const MappedFile& file) {
   constexpr std::size_t kStart = std::size_t{1} << 16U;  // enough to know these two by
   const auto format = detect_format(file.bytes().first(std::min(file.bytes().size(), kStart)));
@@ -354,16 +378,18 @@ Result<std::optional<PackedScan>> packed_scan(const MappedFile& file) {
   if (format.value() == CloudFormat::kDracoTiles) {
     const auto reader = DracoTilesReader::open(file.bytes(), kMostSamples);
     if (!reader) return reader.error();
-    return std::optional(PackedScan{.packing = Packing::kDracoTiles,
-                                    .samples = reader.value().sample_count(),
-                                    .record_bytes = std::nullopt});
+    return std::optional(PackedScan{
+        .packing = Packing::kDracoTiles,
+        .samples = reader.value().sample_count(),
+        .record_bytes = std::nullopt,
+        .most_of_tile = std::ranges::max(reader.value().tiles(), {}, &DracoTile::sample_count).sample_count});
   }
   if (format.value() != CloudFormat::kPly) return std::optional<PackedScan>();
   const auto header = parse_ply_header(file.bytes());
   if (!header) return header.error();
   const PlyElement* const vertex = header.value().vertex();
   if (header.value().encoding != PlyEncoding::kAscii || vertex == nullptr || vertex->count == 0 ||
-      vertex != header.value().elements.data())
+      vertex != header.value().elements.data() || vertex->count > kMostSamples)
     return std::optional<PackedScan>();
   std::uint64_t bytes = 0;
   std::size_t coordinates = 0;

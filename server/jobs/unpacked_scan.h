@@ -23,6 +23,9 @@ struct PackedScan {
   std::uint64_t samples = 0;
   /// Of a sample once unpacked; nullopt: only its tiles say.
   std::optional<std::uint64_t> record_bytes;
+  std::uint64_t most_of_tile = 0;  ///< samples of the largest tile; 0: it has none
+  /// For one tile to be decoded at a time.
+  [[nodiscard]] std::uint64_t least_memory() const;
 };
 /// nullopt where a scan of this kind is read in memory alone. Errors: those of its header or index
 Result<std::optional<PackedScan>> packed_scan(const MappedFile& file);

@@ -9,11 +9,14 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <set>
+#include <span>
 #include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "engine/io/zip_archive.h"
 #include "tests/acceptance/bodies.h"
 #include "tests/acceptance/daemon.h"
 
@@ -144,13 +147,69 @@ TEST_CASE(
   }
 #endif
   // A tile that cannot be decoded is told by its name.
-  std::string torn = bytes_of(in);
-  torn.replace(torn.find("DRACO"), 5, "DRACA");
-  std::ofstream(in, std::ios::binary) << torn;
+  const std::string whole = bytes_of(in);
+  auto reader = ZipReader::open(std::as_bytes(std::span(whole)));
+  REQUIRE(reader.ok());
+  std::vector<std::pair<std::string, std::vector<std::byte>>> files;
+  while (const auto name = reader.value().next().value())
+    files.emplace_back(*name, reader.value().content(std::uint64_t{1} << 30U).value());
+  std::vector<ZipEntry> entries;
+  for (auto& file : files) {
+    if (file.first != "index.csv") file.second[5] = std::byte{9};  // the version of Draco
+    entries.push_back({.name = file.first, .bytes = file.second.size(), .content = [&file] {
+                         return Result(file.second);
+                       }});
+  }
+  std::ofstream torn(in, std::ios::binary);
+  REQUIRE(write_zip(entries, [&](std::span<const std::byte> bytes) {
+            torn.write(reinterpret_cast<const char*>(bytes.data()),
+                       static_cast<std::streamsize>(bytes.size()));
+            return true;
+          }).ok());
+  torn.close();
   const Ended refused = run(command(folder / "none.zip", {"--confined"}));
   CHECK(refused.status != 0);
-  CHECK(refused.err.find("tiles/000000.drc") != std::string::npos);
+  CHECK(refused.err.find("'tiles/000000.drc': ") != std::string::npos);
+  CHECK(refused.err.find("ZIP") == std::string::npos);
+  CHECK_FALSE(std::filesystem::exists(folder / "none.zip.job"));
   CHECK_FALSE(std::filesystem::exists(folder / "none.zip"));
+}
+
+TEST_CASE(
+    "a packed job that is killed at any moments gives the bytes of one that was not, and leaves nothing") {
+  const TemporaryFolder folder;
+  const std::string in = folder / "in.zip";
+  const std::string out = folder / "out.zip";
+  std::ofstream(in, std::ios::binary) << file_of(wavy_sheet(300), CloudFormat::kDracoTiles);
+  std::ofstream(folder / "recipe.json") << kRecipe;
+  const auto command = [&](const std::string& output) {
+    return std::vector<std::string>{
+        POINTWRIGHT_PATH, "job",  "run",      "--recipe", folder / "recipe.json", "--in", in,
+        "--out",          output, "--memory", "64",       "--preview-count",      "2500", "--json"};
+  };
+  const auto begin = Clock::now();
+  REQUIRE(run(command(folder / "undisturbed.zip")).status == 0);
+  const auto whole = Clock::now() - begin;
+  const std::string expected = bytes_of(folder / "undisturbed.zip");
+  constexpr unsigned kSeed = 7;
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<double> part(0.3, 1.0);
+  for (int killed = 0, tried = 0; killed < 8 && tried < 40; ++tried) {
+    const pid_t child = start(command(out));
+    std::this_thread::sleep_for(part(random) * whole);
+    ::kill(child, SIGKILL);
+    int status = 0;
+    REQUIRE(::waitpid(child, &status, 0) == child);
+    killed += WIFSIGNALED(status) ? 1 : 0;
+    if (std::filesystem::exists(out)) CHECK(bytes_of(out) == expected);
+    std::filesystem::remove(out);
+  }
+  REQUIRE(run(command(out)).status == 0);
+  CHECK(bytes_of(out) == expected);
+  std::set<std::string> left;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / ""))
+    left.insert(entry.path().filename().string());
+  CHECK(left == std::set<std::string>{"in.zip", "out.zip", "recipe.json", "undisturbed.zip"});
 }
 
 #ifdef POINTWRIGHT_MPIEXEC

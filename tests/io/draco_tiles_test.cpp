@@ -2,7 +2,10 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,8 +21,10 @@ using Files = std::vector<std::pair<std::string, std::vector<std::byte>>>;
 
 std::vector<std::byte> archive_of(const Files& files) {
   std::vector<ZipEntry> entries;
-  for (const auto& [name, bytes] : files)
-    entries.push_back({.name = name, .bytes = bytes.size(), .content = [&bytes] { return Result(bytes); }});
+  for (const auto& file : files)
+    entries.push_back({.name = file.first, .bytes = file.second.size(), .content = [&file] {
+                         return Result(file.second);
+                       }});
   std::vector<std::byte> archive;
   REQUIRE(write_zip(entries, [&](std::span<const std::byte> bytes) {
             archive.insert(archive.end(), bytes.begin(), bytes.end());
@@ -147,6 +152,13 @@ TEST_CASE("archives that are not whole or not of one kind are refused, and say w
   CHECK(index_with(",100,", ",18446744073709551615,").code == ErrorCode::kTooLarge);
   CHECK(refused([](Files& files) { files[0].second = bytes_of(draco_tiles_index({})); }).code ==
         ErrorCode::kEmptyCloud);
+  CHECK(refused([](Files& files) { files.push_back(files[2]); }).message.find("twice") != std::string::npos);
+  // A good tile that goes on and on, and an index that does.
+  CHECK(refused([](Files& files) { files[2].second.resize(std::size_t{2} << 20U); }).code ==
+        ErrorCode::kTooLarge);
+  std::string many(draco_tiles_index({}));
+  for (int k = 0; k <= 1 << 18; ++k) many += std::to_string(k) + ",1,0,0,0,0,0,0\n";
+  CHECK(parse_draco_tiles_index(many, std::uint64_t{1} << 40U).error().code == ErrorCode::kTooLarge);
   CHECK(error_of(whole, CloudFormat::kDracoTiles, {.max_samples = 299}).code == ErrorCode::kTooLarge);
   for (std::size_t length = 0; length < whole.size(); length += 97) {
     const auto cut = std::span(whole).first(length);
@@ -162,6 +174,16 @@ TEST_CASE("archives that are not whole or not of one kind are refused, and say w
   // Any other archive is told what to do instead.
   const auto stray = archive_of({{"scan.ply", bytes_of("ply")}});
   CHECK(detect_format(stray).error().code == ErrorCode::kUnsupportedFormat);
+}
+
+TEST_CASE("files with names that this program's locale cannot say are nobody's business") {
+  // "läser.txt", marked as UTF-8, between the index and the tile.
+  const auto seed = std::filesystem::path(POINTWRIGHT_CORPUS_DIR) / "draco_tiles" / "utf8_name.zip";
+  std::ifstream file(seed, std::ios::binary);
+  const auto bytes = bytes_of(std::string(std::istreambuf_iterator<char>(file), {}));
+  const auto read = read_cloud(bytes, CloudFormat::kDracoTiles, {});
+  REQUIRE_MESSAGE(read.ok(), why(read));
+  CHECK(read.value().cloud.size() == 4);
 }
 
 TEST_CASE("what an archive cannot take is told, and its files are as long as they were said to be") {

@@ -62,6 +62,8 @@ TEST_CASE("what a killed writer left beside a file goes, and nothing that anothe
                                         path + ".new-",
                                         path + ".new-" + std::to_string(child),
                                         path + ".new-plan",
+                                        path + ".new-" + std::to_string(child) + "-notes.txt",
+                                        path + ".new-2024-05-01",
                                         folder / "other.ply.new-" + std::to_string(child) + "-0"};
   for (const std::string& name : others) REQUIRE(write_file_atomically(name, bytes_of("x")).ok());
   REQUIRE(write_file_atomically(dead, bytes_of("x")).ok());

@@ -147,6 +147,29 @@ TEST_CASE("a preview that is given is the one that counts, in tiles and in memor
   }
 }
 
+TEST_CASE("a flat scan in doubles has the preview that is made of it, or one whose file has rounded it") {
+  const JobFolder job;
+  Cloud sheet = wavy_sheet(60);
+  sheet.position_is_double = true;
+  sheet.exact_position.resize(sheet.size());
+  for (std::size_t i = 0; i < sheet.size(); ++i) {
+    const Vec3f p = sheet.position[i];
+    sheet.position.set(i, {p.x(), p.y(), 0.1F});
+    sheet.exact_position[i] = {static_cast<double>(p.x()), static_cast<double>(p.y()), 0.1};
+  }
+  put(job.in, sheet);
+  Cloud rounded = sheet;
+  rounded.position_is_double = false;
+  rounded.exact_position.clear();
+  JobParams params = job.params(1);
+  for (const JobMode mode : {JobMode::kTiles, JobMode::kMemory})
+    for (const bool is_given : {false, true}) {
+      params.mode = mode;
+      params.preview = is_given ? std::make_shared<const Cloud>(rounded) : nullptr;
+      CHECK(job.run(params).moved > 1000);
+    }
+}
+
 TEST_CASE("in tiles and in memory the same comes out, with any number of threads") {
   const JobFolder job;
   put(job.in, wavy_sheet(200));

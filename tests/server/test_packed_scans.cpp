@@ -1,13 +1,18 @@
 // Jobs in tiles on scans that are no records, and results that become Draco tiles.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
-#include <fstream>
+#include <numeric>
 #include <string>
 #include <vector>
 
 #include "engine/core/parallel.h"
 #include "engine/io/draco_tiles.h"
+#include "server/jobs/packed_result.h"
+#include "server/jobs/team.h"
 #include "tests/server/job_folder.h"
 
 using namespace pointwright;
@@ -115,20 +120,40 @@ TEST_CASE("text that breaks off, goes on or holds a word is refused with its lin
     put(job.in, text);
     JobParams params = job.params();
     params.mode = JobMode::kTiles;
-    return job.refused(params).detail;
+    const std::string detail = job.refused(params).detail;
+    CHECK_FALSE(std::filesystem::exists(params.folder));
+    return detail;
   };
   CHECK(refused_with(whole.substr(0, whole.size() - 20)).find("before all 2 rows") != std::string::npos);
   CHECK(refused_with(whole.substr(0, whole.size() / 2)).find("before all 90000 rows") != std::string::npos);
   CHECK(refused_with(whole + "3 1 2 3\n").find("1 more rows") != std::string::npos);
-  // Of the 70,000th sample: 14 lines of header, and 2 blank ones for each thousand before.
+  // Of the 70,000th sample and of the 20,000th: two blank lines stand behind each thousand.
+  const std::size_t body = whole.find("end_header\n") + 11;
+  const auto header_lines =
+      std::count(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(body), '\n');
+  const auto line_of = [](std::size_t sample) { return sample + 2 * (sample / 1000); };
+  const auto begin_of = [&](const std::string& text, std::size_t sample) {
+    std::size_t at = body;
+    for (std::size_t line = 0; line < line_of(sample); ++line) at = text.find('\n', at) + 1;
+    return at;
+  };
+  const auto named = [&](std::size_t sample) {
+    return "line " + std::to_string(static_cast<std::size_t>(header_lines) + line_of(sample) + 1) + ":";
+  };
   std::string wrong = whole;
-  std::size_t at = wrong.find("end_header\n") + 11;
-  for (int line = 0; line < 70'000 + 2 * 70; ++line) at = wrong.find('\n', at) + 1;
-  const auto header_lines = std::count(
-      whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.find("end_header\n") + 11), '\n');
-  wrong.replace(at, 1, "x");
-  const std::string line = "line " + std::to_string(header_lines + 70'000 + 2 * 70 + 1) + ":";
-  CHECK(refused_with(wrong).find(line) != std::string::npos);
+  wrong.replace(begin_of(wrong, 70'000), 1, "x");
+  CHECK(refused_with(wrong).find(named(70'000)) != std::string::npos);
+  // The first one is told, whichever thread meets it; and a row that is too short by its property.
+  const std::size_t early = begin_of(wrong, 20'000);
+  wrong.erase(wrong.find('\t', early), wrong.find('\n', early) - wrong.find('\t', early));
+  const std::string told = refused_with(wrong);
+  CHECK(told.find(named(20'000)) != std::string::npos);
+  CHECK(told.find("before property 'y'") != std::string::npos);
+  // Where most rows are, as well.
+  std::string bare = whole.substr(0, begin_of(whole, 30'000));
+  for (std::size_t row = 30'000; row < 90'000; ++row) bare += "7\n";
+  bare += "3 0 1 2\n3 1 2 3\n";
+  CHECK(refused_with(bare).find(named(30'000)) != std::string::npos);
   CHECK_FALSE(std::filesystem::exists(job.out));
 }
 
@@ -180,6 +205,30 @@ TEST_CASE("Draco tiles go in and out of tiles: with every attribute, any number 
   CHECK(bytes_of(report.files[1]) != bytes_of(report.files[2]));
 }
 
+TEST_CASE("tiles are written no larger than they may be, wherever the samples stand") {
+  const JobFolder job;
+  Cloud heap = wavy_sheet(100);
+  std::vector<std::uint32_t> order(heap.size());
+  std::iota(order.begin(), order.end(), 0U);
+  order.insert(order.end(), kMostTileSamples + 5, 7U);
+  heap = permuted(heap, order);
+  std::iota(heap.id.begin(), heap.id.end(), 0U);
+  put(job.in, heap);
+  const auto team = lone_team();
+  const auto problem =
+      pack_result(job.in, job.folder / "out.zip", job.folder / "scratch", std::uint64_t{1} << 26U, *team,
+                  ExecutionContext(), [](const std::string&, double) {});
+  REQUIRE_FALSE(problem.has_value());
+  CHECK_FALSE(std::filesystem::exists(job.folder / "scratch"));
+  const auto bytes = read_file(job.folder / "out.zip");
+  REQUIRE(bytes.ok());
+  const auto reader = DracoTilesReader::open(bytes.value(), heap.size());
+  REQUIRE(reader.ok());
+  CHECK(reader.value().sample_count() == heap.size());
+  for (const DracoTile& tile : reader.value().tiles()) CHECK(tile.sample_count <= kMostTileSamples);
+  same_samples(cloud_of(job.folder / "out.zip"), heap);
+}
+
 TEST_CASE("samples that are inserted come out in Draco tiles, too") {
   const JobFolder job;
   put(job.in, wavy_sheet(100));
@@ -211,9 +260,22 @@ TEST_CASE("a packed job that was interrupted keeps its tiles, whenever it ended"
                   }).ok());
     CHECK_FALSE(std::filesystem::exists(params.output));
   }
+  CHECK(std::filesystem::exists(params.folder));
   const JobReport report = job.run(params);
   CHECK(report.tiles_kept == report.tiles);
   CHECK(bytes_of(params.output) == undisturbed);
+
+  // As a killed one leaves its folder: with results half packed, which the next one has no use for.
+  const ExecutionContext context;
+  REQUIRE_FALSE(run_full_resolution(params, context, [&](const std::string& phase, double) {
+                  if (phase == "result") context.cancel();
+                }).ok());
+  std::filesystem::create_directories(params.folder + "/tiles.packed");
+  for (const char* const name : {"tiles.packed/records.bin", "tiles.packed/tile-0-0.packed",
+                                 "edited.unpacked", "edited.unpacked.new-1-0", "tile-0-0.result.new-1-0"})
+    put(params.folder + "/" + name, "torn");
+  params.output = job.out;
+  CHECK(job.run(params).tiles_kept == report.tiles);  // which sees that nothing is left
 }
 
 TEST_CASE(
@@ -232,6 +294,23 @@ TEST_CASE(
   CHECK(estimate.value().mode == JobMode::kTiles);
   CHECK(estimate.value().samples == 3600);
   CHECK(estimate.value().disk_bytes > 3600 * (3 * 32 + 3 * 22));
+  // What leaves out samples is no work for tiles.
+  params.output = job.out;
+  std::string holed = text_ply(60, "\n");
+  const std::size_t at = holed.find("end_header\n") + 11;
+  holed.replace(at, holed.find('\n', at) - at, "0 nan 2 7 8 0.5 0.5");
+  put(job.in, holed);
+  params.drop_non_finite = true;
+  const JobReport dropped = job.run(params);
+  CHECK(dropped.mode == JobMode::kMemory);
+  CHECK(dropped.samples == 3599);
+  std::filesystem::remove(job.out);
+  params.drop_non_finite = false;
+  params.mode = JobMode::kTiles;
+  CHECK(job.refused(params).kind == ProblemKind::kNonFinite);
+  std::filesystem::remove_all(params.folder);
+  put(job.in, text_ply(60, "\n"));
+  params.output = job.folder / "out.zip";
   // In memory the format serves as any other.
   params.mode = JobMode::kMemory;
   CHECK(job.run(params).mode == JobMode::kMemory);
