@@ -61,8 +61,8 @@ class DracoTilesReader {
     std::vector<std::byte> bytes;  ///< a Draco file
   };
   /// Every tile once, in the order of their places in the archive; nullopt behind the last.
-  /// Errors: those of ZipReader; kMalformedData where a tile of the index is missing or there twice; kTooLarge
-  ///         beyond 1 KiB a sample
+  /// Errors: those of ZipReader; kMalformedData where a tile of the index is missing or there twice;
+  ///         kTooLarge beyond 1 KiB a sample
   Result<std::optional<Piece>> next();
 
  private:

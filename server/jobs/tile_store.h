@@ -74,7 +74,8 @@ class TileStore {
   /// One pass over the scan: every sample into its tile, with its whole record where they are to be read tile
   /// by tile. Done by all of the team.
   /// Errors: kTooLarge (the disk is full; field "path"), kInvalidArgument (it cannot be written), kCancelled
-  /// Cost:   32 bytes of disk a sample, and 36 of memory for 2^22 samples; the records' bytes of disk besides, and 128 MiB
+  /// Cost:   32 bytes of disk a sample, and 36 of memory for 2^22 samples; with records their bytes of disk
+  ///         besides, and 128 MiB of memory
   Result<void> sort(const MappedFile& file, const ScanRecords& records, Team& team,
                     const ExecutionContext& context, bool with_records = false);
   /// The leader's, once all have sorted: from then on the folder is sorted. Errors: those of sort()
