@@ -1,7 +1,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -11,13 +10,13 @@
 
 #include "server/cli/commands.h"
 #include "server/ingest/confined.h"
+#include "server/jobs/team.h"
 
 namespace {
 
 /// How many processes MPI has started this one among; 0: it was not MPI.
 int started_by_mpi() {
-  // Open MPI's mpirun; MPICH's and Slurm's PMI; Slurm's steps.
-  for (const char* const name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"})
+  for (const char* const name : pointwright::server::kTeamVariables)
     if (const char* const text = std::getenv(name)) return std::max(1, std::atoi(text));
   return 0;
 }

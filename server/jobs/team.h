@@ -2,6 +2,7 @@
 // Those who do one job together, each its share: processes that mpirun or srun has started, or this one
 // alone.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -15,6 +16,11 @@
 #include "protocol/json/problem.h"
 
 namespace pointwright::server {
+
+/// What a process of a team finds its number of members in: of Open MPI's mpirun, of MPICH's and Slurm's PMI,
+/// of Slurm's steps.
+inline constexpr std::array<const char*, 3> kTeamVariables{"OMPI_COMM_WORLD_SIZE", "PMI_SIZE",
+                                                           "SLURM_STEP_NUM_TASKS"};
 
 /// A file that all of a team write to, each in places of its own. Closed by all of them together.
 class SharedFile {

@@ -6,6 +6,7 @@
 
 #include "server/config/config.h"
 #include "server/ingest/confined.h"
+#include "server/jobs/team.h"
 #include "server/main/daemon.h"
 #include "server/main/token_command.h"
 
@@ -32,5 +33,9 @@ int main(int argc, char** argv) {
     (exit->status == 0 ? std::cout : std::cerr) << exit->text;
     return exit->status;
   }
+  // A daemon that was started by MPI or by Slurm works alone, and so do its workers unless a launcher makes
+  // them a team.
+  for (const char* const name : server::kTeamVariables)
+    ::unsetenv(name);  // NOLINT(concurrency-mt-unsafe): no thread has been started
   return server::run_daemon(std::get<server::Config>(outcome));
 }

@@ -339,6 +339,19 @@ TEST_CASE("a daemon that is told to stop ends its worker in time; the next one g
   CHECK(done(daemon, job)["attempts"] == 2);
 }
 
+TEST_CASE("the workers of a daemon that MPI or Slurm has started are no processes of its team") {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "tell.sh") << "env >&2; exit 7\n";
+  Daemon daemon({"--launcher", "tell=sh " + (folder / "tell.sh") + " {worker}"},
+                {"OMPI_COMM_WORLD_SIZE=2", "PMI_SIZE=2", "SLURM_STEP_NUM_TASKS=2", "SLURM_JOB_ID=1234"});
+  const Lifted lifted(daemon);
+  const json told = ended(daemon, submit(daemon, {{"session", lifted.session}, {"launcher", "tell"}}));
+  const std::string log = daemon.get(path_of(told) + "/log").body;
+  CHECK(log.find("SLURM_JOB_ID=1234") != std::string::npos);  // what srun goes by stays
+  for (const char* const name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"})
+    CHECK(log.find(std::string(name) + "=") == std::string::npos);
+}
+
 TEST_CASE("a worker that dies fails its job with a plain reason, and nothing else") {
   const TemporaryFolder folder;
   const auto launcher = [&](const std::string& name, const std::string& text) {
