@@ -188,7 +188,23 @@ class TileRun {
     if (auto problem = folder_.take(params_.folder, team_)) return *problem;
     if (team_.leads())
       for (const std::string& output : outputs_of(params_)) remove_leftovers(output);
-    if (auto problem = unpack()) return *problem;
+    if (auto problem = work()) {
+      // Made anew by the job that goes on; what tiles there are stay for it.
+      if (team_.leads()) folder_.drop_scan();
+      return *problem;
+    }
+    if (team_.leads()) folder_.remove();
+    progress_("done", 1.0);
+    return report_;
+  }
+
+ private:
+  // Where in a job's progress the one ends and the other begins.
+  static constexpr double kUnpacking = 0.1;
+  static constexpr double kPacking = 0.85;
+
+  std::optional<Problem> work() {
+    if (auto problem = unpack()) return problem;
     auto made = run_tiles(
         params_,
         {.file = *scan_,
@@ -199,16 +215,8 @@ class TileRun {
     if (!made.ok()) return made.problem();
     report_ = std::move(made.value().report);
     report_.files = outputs_of(params_);
-    if (auto problem = finish(made.value().is_changed)) return *problem;
-    if (team_.leads()) folder_.remove();
-    progress_("done", 1.0);
-    return report_;
+    return finish(made.value().is_changed);
   }
-
- private:
-  // Where in a job's progress the one ends and the other begins.
-  static constexpr double kUnpacking = 0.1;
-  static constexpr double kPacking = 0.85;
 
   [[nodiscard]] JobProgress part_of_progress(double begin, double end) const {
     return [this, begin, end](const std::string& phase, double fraction) {
@@ -224,10 +232,8 @@ class TileRun {
     }
     const std::string path = params_.folder + "/" + ScratchFolder::kScanName;
     if (auto problem = unpack_scan(params_, *chosen_.file, *chosen_.packed, path, team_, context_,
-                                   part_of_progress(0.0, kUnpacking))) {
-      if (team_.leads()) folder_.drop_scan();
+                                   part_of_progress(0.0, kUnpacking)))
       return problem;
-    }
     auto file = MappedFile::open(path);
     auto records =
         file ? ScanRecords::of(file.value().bytes()) : Result<std::optional<ScanRecords>>(file.error());

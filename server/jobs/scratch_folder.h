@@ -19,7 +19,7 @@ class ScratchFolder {
   std::optional<protocol::Problem> take(const std::string& path, Team& team);
   /// Deletes what jobs have written into it, and the folder itself unless there is something of others in it.
   void remove() const;
-  /// Deletes an unpacked scan that is not whole, and the folder itself where it is empty then.
+  /// Deletes an unpacked scan, and the folder itself where it is empty then.
   void drop_scan() const;
 
   /// Where a scan is unpacked to, and results that are to be packed; of an animation with their numbers. No
