@@ -1,6 +1,7 @@
 #pragma once
 // What a job reads: the scan whole, or as records; and which mode that leads to.
 
+#include <cstdint>
 #include <optional>
 
 #include "engine/core/result.h"
