@@ -29,6 +29,8 @@ struct PlyProperty {
 struct PlyElement {
   std::string name;
   std::uint64_t count = 0;
+  std::size_t count_at = 0;      ///< the first byte of the count in the header
+  std::size_t count_length = 0;  ///< of its word
   std::vector<PlyProperty> properties;
 
   [[nodiscard]] bool has_lists() const;

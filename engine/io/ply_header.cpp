@@ -114,6 +114,8 @@ class HeaderParser {
     }
     if (header_.elements.size() == kMostElements)
       return malformed(header_.line_count, "more than 256 elements");
+    element.count_at = static_cast<std::size_t>(count.data() - text_.data());
+    element.count_length = count.size();
     header_.elements.push_back(std::move(element));
     return {};
   }

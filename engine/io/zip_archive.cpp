@@ -4,7 +4,6 @@
 #include <archive_entry.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <utility>
 
 #include "engine/io/text.h"
@@ -31,11 +30,16 @@ Error unwritten(archive* to) {
       .field = "path"};
 }
 
-la_ssize_t give_to_sink(archive* to, void* sink, const void* bytes, std::size_t count) {
-  const auto& take = *static_cast<const ByteSink*>(sink);
-  if (take({static_cast<const std::byte*>(bytes), count})) return static_cast<la_ssize_t>(count);
-  archive_set_error(to, EIO, "there is no room for it");
-  return -1;
+struct Taker {
+  const ByteSink& sink;
+  bool is_ended = false;  // what comes is thrown away
+};
+
+/// Never fails: libarchive loses the memory of an archive that ends with a failure.
+la_ssize_t give_to_sink(archive*, void* context, const void* bytes, std::size_t count) {
+  auto& taker = *static_cast<Taker*>(context);
+  if (!taker.is_ended && !taker.sink({static_cast<const std::byte*>(bytes), count})) taker.is_ended = true;
+  return static_cast<la_ssize_t>(count);
 }
 
 Result<void> add(archive* to, const ZipEntry& entry) {
@@ -62,18 +66,22 @@ Result<void> add(archive* to, const ZipEntry& entry) {
 
 Result<void> write_zip(std::span<const ZipEntry> entries, const ByteSink& sink) {
   const std::unique_ptr<archive, int (*)(archive*)> to(archive_write_new(), archive_write_free);
-  ByteSink taker = sink;
+  Taker taker{.sink = sink};
   if (archive_write_set_format_zip(to.get()) != ARCHIVE_OK ||
       archive_write_set_format_option(to.get(), "zip", "compression", "store") != ARCHIVE_OK ||
       archive_write_set_bytes_in_last_block(to.get(), 1) != ARCHIVE_OK ||
       archive_write_open(to.get(), &taker, nullptr, give_to_sink, nullptr) != ARCHIVE_OK)
     return unwritten(to.get());
   for (const ZipEntry& entry : entries)
-    if (auto added = add(to.get(), entry); !added) {
-      archive_write_fail(to.get());
+    if (auto added = taker.is_ended ? Result<void>() : add(to.get(), entry); !added) {
+      taker.is_ended = true;
       return added;
     }
   if (archive_write_close(to.get()) != ARCHIVE_OK) return unwritten(to.get());
+  if (taker.is_ended)
+    return Error{.code = ErrorCode::kInvalidArgument,
+                 .message = "there is no room for the ZIP archive",
+                 .field = "path"};
   return {};
 }
 

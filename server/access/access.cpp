@@ -177,6 +177,21 @@ Outcome<QuotaHold> Access::hold_part(const Caller& caller, Quota quota, std::uin
   // Guests' streams are their own: they leave those of who shared the session alone.
   const std::string account = quota == Quota::kStreams ? request_key(caller) : caller.token;
   if (auto held = accounts_.hold(account, quota, amount, limit)) return held;
+  return quota_problem(account, quota, amount, limit);
+}
+
+Outcome<Done> Access::check(const Caller& caller, std::initializer_list<QuotaPart> parts) const {
+  if (caller.token.empty()) return Done{};
+  for (const auto& [quota, amount] : parts) {
+    const std::uint64_t limit = limit_of(caller, quota);
+    const std::uint64_t held = accounts_.held(caller.token, quota);
+    if (held > limit || amount > limit - held) return quota_problem(caller.token, quota, amount, limit);
+  }
+  return Done{};
+}
+
+Problem Access::quota_problem(const std::string& account, Quota quota, std::uint64_t amount,
+                              std::uint64_t limit) const {
   const std::string name(protocol::kQuotas.at(static_cast<std::size_t>(quota)).name);
   Problem problem{.kind = ProblemKind::kTooMany,
                   .detail = std::string("one more would exceed the token's quota ").append(name),

@@ -37,6 +37,8 @@ class Access {
   Outcome<Done> charge_upload(const Caller& caller, std::uint64_t bytes);
   /// Holds parts of the caller's quotas, but for the two above: all of them, or none. Problem: too many
   Outcome<QuotaHold> hold(const Caller& caller, std::initializer_list<QuotaPart> parts);
+  /// Whether hold() would have room now; nothing is held, so that nobody else is refused for it meanwhile.
+  [[nodiscard]] Outcome<Done> check(const Caller& caller, std::initializer_list<QuotaPart> parts) const;
 
   /// The same for what its owner has already, whatever the quota is now: after a restart.
   QuotaHold hold_again(const std::string& owner, std::initializer_list<QuotaPart> parts);
@@ -47,6 +49,8 @@ class Access {
 
  private:
   Outcome<QuotaHold> hold_part(const Caller& caller, Quota quota, std::uint64_t amount);
+  [[nodiscard]] protocol::Problem quota_problem(const std::string& account, Quota quota, std::uint64_t amount,
+                                                std::uint64_t limit) const;
   [[nodiscard]] Outcome<Caller> caller_of(std::string_view secret) const;
   [[nodiscard]] Buckets::Flow request_flow(const Caller& caller) const;
   [[nodiscard]] Buckets::Flow upload_flow(const Caller& caller) const;

@@ -67,7 +67,7 @@ Result<std::vector<std::byte>> las_head(const ScanRecords& records, std::vector<
                  .field = "resampling.max_samples",
                  .limit = static_cast<double>(std::numeric_limits<std::uint32_t>::max()),
                  .actual = static_cast<double>(count)};
-  if (has_legacy_counts(head)) put(std::span(head), kLegacyCountAt, legacy(count));
+  put(std::span(head), kLegacyCountAt, has_legacy_counts(head) ? legacy(count) : 0U);
   const std::uint64_t new_end = records.begin + count * records.record_bytes;
   if (is_version(head, 3, kExtendedAt)) move_place(head, kWaveformsAt, records.end(), new_end);
   if (is_version_14(head)) {
@@ -77,31 +77,22 @@ Result<std::vector<std::byte>> las_head(const ScanRecords& records, std::vector<
   return head;
 }
 
-/// The header with another number in the line "element vertex <count>".
+/// The header with another number of vertices.
 Result<std::vector<std::byte>> ply_head(std::span<const std::byte> head, std::uint64_t count) {
-  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
-  constexpr std::string_view kBlanks = " \t";
-  for (std::size_t line = 0; line < text.size();) {
-    const std::size_t end = std::min(text.find_first_of("\r\n", line), text.size());
-    std::array<std::string_view, 3> words;
-    std::size_t from = line;
-    for (std::string_view& word : words) {
-      from = std::min(text.find_first_not_of(kBlanks, from), end);
-      const std::size_t to = std::min(text.find_first_of(kBlanks, from), end);
-      word = text.substr(from, to - from);
-      from = to;
-    }
-    if (words[0] == "element" && words[1] == "vertex") {
-      const auto begin = static_cast<std::size_t>(words[2].data() - text.data());
-      std::string made(text.substr(0, begin));
-      made.append(std::to_string(count)).append(text.substr(begin + words[2].size()));
-      const auto bytes = std::as_bytes(std::span(made));
-      return std::vector<std::byte>(bytes.begin(), bytes.end());
-    }
-    line = end + 1;
-  }
-  return Error{
-      .code = ErrorCode::kMalformedData, .message = "the header counts no vertices", .field = "vertex"};
+  const auto header = parse_ply_header(head);
+  if (!header) return header.error();
+  const PlyElement* const vertex = header.value().vertex();
+  if (vertex == nullptr)
+    return Error{
+        .code = ErrorCode::kMalformedData, .message = "the header counts no vertices", .field = "vertex"};
+  const std::string text = std::to_string(count);
+  const auto number = std::as_bytes(std::span(text.data(), text.size()));
+  const auto before = head.first(vertex->count_at);
+  const auto behind = head.subspan(vertex->count_at + vertex->count_length);
+  std::vector<std::byte> made(before.begin(), before.end());
+  made.insert(made.end(), number.begin(), number.end());
+  made.insert(made.end(), behind.begin(), behind.end());
+  return made;
 }
 
 }  // namespace
@@ -122,9 +113,11 @@ Result<std::vector<std::byte>> head_of_result(const ScanRecords& records, std::s
 }
 
 void set_returns(std::span<std::byte> head, const ReturnCounts& counts) {
-  if (has_legacy_counts(head))
-    for (std::size_t k = 0; k < kLegacyReturns; ++k)
-      put(head, kLegacyReturnsAt + sizeof(std::uint32_t) * k, legacy(counts.at(k)));
+  // Where the older fields count nothing they say so, whatever stood there.
+  const bool has_legacy = has_legacy_counts(head);
+  if (!has_legacy) put(head, kLegacyCountAt, 0U);
+  for (std::size_t k = 0; k < kLegacyReturns; ++k)
+    put(head, kLegacyReturnsAt + sizeof(std::uint32_t) * k, has_legacy ? legacy(counts.at(k)) : 0U);
   if (is_version_14(head))
     for (std::size_t k = 0; k < counts.size(); ++k)
       put(head, kReturnsAt + sizeof(std::uint64_t) * k, counts.at(k));

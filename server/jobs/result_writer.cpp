@@ -23,6 +23,9 @@ namespace {
 constexpr std::uint64_t kWriteChunk = std::uint64_t{1} << 20U;  // samples
 /// Where samples were inserted: each may have become kMostParts of them.
 constexpr std::uint64_t kGrowingChunk = std::uint64_t{1} << 17U;
+/// Of a chunk's records, however long each is.
+constexpr std::uint64_t kChunkBytes = std::uint64_t{1} << 26U;
+constexpr std::uint64_t kLeastChunk = std::uint64_t{1} << 10U;
 constexpr std::uint64_t kInsertedPiece = std::uint64_t{1} << 18U;  // that are written together
 constexpr std::size_t kChunksAtOnce = 2;
 
@@ -83,7 +86,8 @@ void ResultWriter::cut_into_chunks() {
   }
   // A LAS file's header says how far its samples reach.
   has_contents_ = records_.format == CloudFormat::kLas && (any_moved || removed_ + inserted_ > 0);
-  const std::uint64_t size = inserted_ > 0 ? kGrowingChunk : kWriteChunk;
+  const std::uint64_t most = inserted_ > 0 ? kGrowingChunk : kWriteChunk;
+  const std::uint64_t size = std::clamp(kChunkBytes / records_.record_bytes, kLeastChunk, most);
   chunks_.clear();
   for (std::uint64_t begin = 0; begin < records_.count; begin += size)
     chunks_.push_back({.begin = begin, .end = std::min(records_.count, begin + size)});
@@ -224,8 +228,9 @@ bool ResultWriter::write_inserted(SharedFile& out, std::size_t chunk, Contents& 
   std::ranges::stable_sort(records, {}, &Record::root);
   std::uint64_t at = head_.size() + (records_.count - removed_ + chunks_[chunk].inserted_before) * size;
   std::vector<std::byte> piece;
-  for (std::size_t first = 0; first < records.size(); first += kInsertedPiece) {
-    const std::size_t count = std::min<std::size_t>(kInsertedPiece, records.size() - first);
+  const std::uint64_t most = std::clamp(kChunkBytes / size, kLeastChunk, kInsertedPiece);
+  for (std::size_t first = 0; first < records.size(); first += most) {
+    const std::size_t count = std::min<std::size_t>(most, records.size() - first);
     piece.resize(count * size);
     for (std::size_t k = 0; k < count; ++k)
       std::memcpy(piece.data() + k * size, records[first + k].bytes, size);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <string>
 
@@ -60,6 +61,22 @@ double usual_family(const PlayedSteps& played) {
   return *place;
 }
 
+/// Samples that the smallest tile comes to where those stand that become most.
+double most_of_one_tile(const PlayedSteps& played, std::uint64_t samples, double around) {
+  std::vector<std::uint32_t> families = greatest_families(played);
+  std::ranges::sort(families, std::greater<>());
+  const double each = std::max(1.0, static_cast<double>(samples) / static_cast<double>(families.size()));
+  double left = std::pow(std::sqrt(kLeastSamples) + around, 2.0);
+  double become = 0.0;
+  for (const std::uint32_t family : families) {
+    const double taken = std::min(left, each);
+    become += taken * family;
+    left -= taken;
+    if (left <= 0.0) break;
+  }
+  return become;
+}
+
 }  // namespace
 
 bool resamples(const PlayedSteps& played) {
@@ -91,9 +108,9 @@ double TilePlan::weight_of(double family) const {
 }
 
 Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, std::uint32_t neighbors,
-                             std::uint64_t memory_bytes) {
+                             std::uint64_t value_bytes, std::uint64_t memory_bytes) {
   const std::uint64_t bytes_each = kBytesOfSample + kBytesOfBand * played.script.bases.bands.size() +
-                                   (resamples(played) ? kBytesOfResampling : 0);
+                                   (resamples(played) ? kBytesOfResampling + value_bytes : 0);
   const auto samples_in = [&](std::uint64_t bytes, std::size_t lanes) {
     return kShareOfTiles * static_cast<double>(bytes) / static_cast<double>(lanes * bytes_each);
   };
@@ -105,6 +122,8 @@ Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, s
     const double room = samples_in(memory_bytes, lanes);
     const double widest = std::sqrt(room / family);  // that is read
     if ((widest - around) * kWidest < widest) continue;
+    // A tile where samples become most, all in one place, can be no smaller than that.
+    if (lanes > 1 && most_of_one_tile(played, samples, around) > room) continue;
     const double side = std::min(std::sqrt(room / kAround), std::sqrt(room) - around);
     return TilePlan{.most = static_cast<std::uint64_t>(std::max(kLeastSamples, side * side)),
                     .lanes = lanes,

@@ -28,10 +28,11 @@ struct TilePlan {
 };
 /// Of what memory leaves room for: tiles with all that is around them, two side by side where that makes them
 /// no narrower than an eighth of what is read.
-/// `samples`: of the whole scan, as many as they become; `neighbors`: of a neighbourhood
+/// `samples`: of the whole scan, as many as they become; `neighbors`: of a neighbourhood; `value_bytes`: of
+/// what a sample takes along besides, where samples are inserted
 /// Problem: out of space, where what an edit of one sample depends on takes more than the memory
 Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, std::uint32_t neighbors,
-                             std::uint64_t memory_bytes);
+                             std::uint64_t value_bytes, std::uint64_t memory_bytes);
 
 /// The candidates that tiles are cut by, each as often as it weighs: a tile whose samples become many holds
 /// fewer of them. About the script's origin.

@@ -95,6 +95,9 @@ class TileStore {
   /// Errors: kInvalidArgument (cannot be read)
   [[nodiscard]] Result<std::vector<std::byte>> own_records(std::size_t tile, std::size_t record_bytes) const;
 
+  /// Of the files: those of another layout are another job's.
+  static constexpr std::uint64_t kLayout = 2;
+
   /// Of one step of an animation; a plain job has step 0 alone.
   [[nodiscard]] bool has_result(std::size_t tile, std::size_t step) const;
   /// On the disk once it returns. Errors: those of write_file_atomically

@@ -164,8 +164,12 @@ class TiledJob {
     report_.spacing = static_cast<double>(script.bases.spacing * script.spacing_ratio);
     rings_ = rings_of(played_);
     resamples_ = resamples(played_);
-    auto plan =
-        plan_tiles(played_, records_.count + inserted_by_preview(), params_.neighbors, params_.memory_bytes);
+    // Numbers that are mixed stand in columns, thrice while they are; records of inserted samples twice.
+    std::uint64_t values = 2 * records_.record_bytes;
+    for (const ScanRecords::Place& place : records_.mixed())
+      values += 3 * std::max(sizeof(float), size_of(place.type));
+    auto plan = plan_tiles(played_, records_.count + inserted_by_preview(), params_.neighbors, values,
+                           params_.memory_bytes);
     if (!plan.ok()) return plan.problem();
     plan_ = plan.value();
     // The same two samples have the same order in every tile: of two in one place one is collected.
@@ -189,6 +193,7 @@ class TiledJob {
     const std::array<std::uint64_t, 5> numbers{records_.count, plan_.most, params_.neighbors, rings_,
                                                outputs_.size()};
     add(numbers.data(), sizeof numbers);
+    add(&TileStore::kLayout, sizeof TileStore::kLayout);
     add(&surveyed_.digest, sizeof surveyed_.digest);
     add(&played_.script.origin, sizeof(Vec3d));
     for (const double scale : params_.request.recipe.level_scales) add(&scale, sizeof scale);
@@ -382,18 +387,40 @@ class TiledJob {
 
   std::optional<Problem> write(std::size_t step) {
     progress_result(step, 0.0);
-    report_.moved = report_.inserted = report_.removed = 0;
     std::vector<MadeTile> tiles;
-    std::vector<std::uint64_t> counts;
     std::vector<PreviewMatch> best(played_.rest.size(), {.rest_distance = std::numeric_limits<float>::max()});
+    // One of them may see less of a shared disk than the others.
+    if (auto any = team_.agree(open_results(step, tiles, best))) return any;
+    DifferenceSum differences;  // the last step's stay
+    for (const PreviewMatch& match : best)
+      if (static_cast<double>(match.rest_distance) <= report_.spacing)
+        differences.add(static_cast<double>(match.difference));
+    differences.report(report_);
+
+    is_changed_.push_back(report_.moved + report_.inserted + report_.removed > 0);
+    ResultWriter writer(file_, records_, team_, played_.script.origin, context_,
+                        [&](double part) { progress_result(step, part); });
+    return writer.write(outputs_[step], tiles);
+  }
+
+  /// Opens what became of the step's tiles, and adds it up.
+  std::optional<Problem> open_results(std::size_t step, std::vector<MadeTile>& tiles,
+                                      std::vector<PreviewMatch>& best) {
+    report_.moved = report_.inserted = report_.removed = 0;
+    std::vector<std::uint64_t> counts;
     for (std::size_t tile = 0; tile < store_->tile_count(); ++tile) {
       if (store_->sample_count(tile) == 0) continue;
-      auto file = MappedFile::open(store_->result_path(tile, step));
+      const std::string path = store_->result_path(tile, step);
+      auto file = MappedFile::open(path);
       if (!file) return protocol::to_problem(file.error());
-      auto view = view_result(file.value().bytes());
-      if (!view) return protocol::to_problem(view.error());
-      if (view.value().records.size() != view.value().roots.size() * records_.record_bytes)
-        return Problem{.kind = ProblemKind::kInternalError, .detail = "a tile's result has other records"};
+      const auto view = view_result(file.value().bytes());
+      if (!view || !is_of_scan(view.value())) {
+        // Made again by the job that goes on.
+        std::error_code none;
+        std::filesystem::remove(path, none);
+        return Problem{.kind = ProblemKind::kInternalError,
+                       .detail = "the result of tile " + std::to_string(tile + 1) + " is damaged"};
+      }
       counts.resize(std::max(counts.size(), view.value().counts.size()));
       for (std::size_t k = 0; k < view.value().counts.size(); ++k) counts[k] += view.value().counts[k];
       report_.moved += view.value().moved.size();
@@ -405,17 +432,16 @@ class TiledJob {
       file.value().release(0, file.value().bytes().size());
       tiles.push_back({.file = std::move(file).value(), .result = view.value()});
     }
-    if (auto problem = check_limits(step, counts)) return problem;
-    DifferenceSum differences;  // the last step's stay
-    for (const PreviewMatch& match : best)
-      if (static_cast<double>(match.rest_distance) <= report_.spacing)
-        differences.add(static_cast<double>(match.difference));
-    differences.report(report_);
+    return check_limits(step, counts);
+  }
 
-    is_changed_.push_back(report_.moved + report_.inserted + report_.removed > 0);
-    ResultWriter writer(file_, records_, team_, played_.script.origin, context_,
-                        [&](double part) { progress_result(step, part); });
-    return writer.write(outputs_[step], tiles);
+  /// Whether a result speaks of the scan's samples and of records as long as its own.
+  [[nodiscard]] bool is_of_scan(const TileResultView& view) const {
+    const auto is_sample = [&](std::uint64_t index) { return index < records_.count; };
+    return view.records.size() == view.roots.size() * records_.record_bytes &&
+           (view.moved.empty() || is_sample(view.moved.back().index)) &&
+           (view.removed.empty() || is_sample(view.removed.back())) &&
+           (view.roots.empty() || is_sample(view.roots.back()));
   }
 
   void progress_result(std::size_t step, double part) const {

@@ -138,12 +138,12 @@ Outcome<Done> admit_upload(Service& service, const BodyPolicy& policy, const Req
                            const Caller& caller) {
   const auto key = head.header("idempotency-key");
   if (key && service.answers.has(caller.key_owner(), std::string(*key))) return Done{};
+  if (key && service.imports.has_begun(caller.token, std::string(*key))) return Done{};
   const bool is_cloud = policy.kind == Body::kCloud;
   if (auto room = is_cloud ? service.clouds.check_room() : service.images.check_room(); !room.ok())
     return room;
-  const auto held = service.access.hold(caller, {{Quota::kStoredBytes, head.content_length.value_or(0)},
-                                                 {is_cloud ? Quota::kClouds : Quota::kImages, 1}});
-  return held.ok() ? Outcome<Done>(Done{}) : held.problem();
+  return service.access.check(caller, {{Quota::kStoredBytes, head.content_length.value_or(0)},
+                                       {is_cloud ? Quota::kClouds : Quota::kImages, 1}});
 }
 
 /// Where the bytes of a body are held from as they arrive. Documents have a reserve of their own, so that no

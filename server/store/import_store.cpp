@@ -136,6 +136,13 @@ std::optional<ImportDocument> ImportStore::find_key(const std::string& owner, co
   return std::nullopt;
 }
 
+bool ImportStore::has_begun(const std::string& owner, const std::string& idempotency_key) const {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::any_of(entries_, [&](const auto& entry) {
+    return entry->owner == owner && entry->key.starts_with(idempotency_key + "\n");
+  });
+}
+
 std::optional<std::string> ImportStore::owner_of(const std::string& id) const {
   const std::lock_guard lock(mutex_);
   const auto entry = find_locked(id);

@@ -33,7 +33,8 @@ class ImportStore {
     std::string name;
     std::uint64_t bytes = 0;
     std::string owner;
-    /// Of the request, where it may come again: it then gets the import that it has begun. Empty: none.
+    /// Of the request, where it may come again: it then gets the import that it has begun. Its
+    /// Idempotency-Key, a line end, and what else the request says. Empty: none.
     std::string key = {};
   };
   /// Stores the cloud, or says why not. Told when to end by the context, which it tells how far it is.
@@ -45,6 +46,8 @@ class ImportStore {
   /// The one that the owner's request with this key has begun.
   [[nodiscard]] std::optional<protocol::ImportDocument> find_key(const std::string& owner,
                                                                  const std::string& key) const;
+  /// Whether a request of the owner with this Idempotency-Key has begun one, whatever else it said.
+  [[nodiscard]] bool has_begun(const std::string& owner, const std::string& idempotency_key) const;
   [[nodiscard]] std::optional<std::string> owner_of(const std::string& id) const;
   /// Of the owners that may be seen, oldest first.
   [[nodiscard]] std::vector<protocol::ImportDocument> list(

@@ -465,9 +465,32 @@ TEST_CASE("what a token holds counts after a restart, and full quotas refuse no 
     return daemon.ask("POST", "/v1/images", page,
                       bearer + "Content-Type: image/png\r\nIdempotency-Key: " + key + "\r\n");
   };
+  const auto later = [&](Daemon& daemon, const std::string& key) {
+    return daemon.ask(
+        "POST", "/v1/clouds", sheet(),
+        bearer + "Content-Type: application/x-ply\r\nPrefer: respond-async\r\nIdempotency-Key: " + key +
+            "\r\n");
+  };
   const auto used = [&](Daemon& daemon, const char* quota) {
     return daemon.get("/v1/info", bearer).json()["caller"]["quotas"][quota]["used"].get<std::size_t>();
   };
+  // One that is made later, and is gone again, has its answer as well, while it is known.
+  const Reply begun = later(guarded.daemon, "l");
+  REQUIRE(begun.status == 202);
+  const std::string import = begun.headers.at("location");
+  const auto state = [&] { return guarded.daemon.get(import, bearer).json()["state"].get<std::string>(); };
+  for (int i = 0; i < 500 && state() != "successful"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  REQUIRE(used(guarded.daemon, "clouds") == 1);
+  CHECK(later(guarded.daemon, "l2").status == 429);
+  const Reply repeated = later(guarded.daemon, "l");
+  CHECK(repeated.status == 202);
+  CHECK(repeated.headers.at("location") == import);
+  const auto stored = guarded.daemon.get(import, bearer).json();
+  REQUIRE(stored["state"] == "successful");
+  const std::string made = "/v1/clouds/" + stored["cloud"]["id"].get<std::string>();
+  REQUIRE(guarded.daemon.ask("DELETE", made, "", bearer).status == 204);
+
   const Reply first_cloud = cloud(guarded.daemon, "c");
   const Reply first_image = image(guarded.daemon, "i");
   REQUIRE(first_cloud.status == 201);

@@ -1331,7 +1331,7 @@ export interface components {
                 mode: "tiles" | "memory" | "direct";
                 sample_count: components["schemas"]["Count"];
                 memory_bytes: components["schemas"]["Count"];
-                /** @description Of scratch and result together, at most */
+                /** @description Of scratch and result together, at most; what resampling adds is known where the edits have a preview that is there, as those of a session have */
                 disk_bytes: components["schemas"]["Count"];
                 free_disk_bytes: components["schemas"]["Count"];
                 seconds: number;
