@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "engine/resampling/splitting.h"
+#include "engine/spatial/kd_tree.h"
 
 namespace pointwright::server {
 namespace {
@@ -28,7 +29,7 @@ constexpr double kLeastSamples = 4096.0;
 /// What is read is at most so many times as wide as the tile: else tiles are made one after another.
 constexpr double kWidest = 8.0;
 /// No job is refused for what the preview and the program take anyway.
-constexpr std::uint64_t kLeastMemory = std::uint64_t{128} << 20U;
+constexpr std::uint64_t kLeastMemory = std::uint64_t{256} << 20U;
 /// TileStore::load takes rings this much wider than even scans have them.
 constexpr double kRingRoom = 1.25;
 
@@ -61,20 +62,43 @@ double usual_family(const PlayedSteps& played) {
   return *place;
 }
 
-/// Samples that the smallest tile comes to where those stand that become most.
+/// Samples that the smallest tile comes to, with all that is read around it, where those stand that become
+/// most: the most of discs about up to 256 of the preview's samples that become at least half as many as any.
 double most_of_one_tile(const PlayedSteps& played, std::uint64_t samples, double around) {
-  std::vector<std::uint32_t> families = greatest_families(played);
-  std::ranges::sort(families, std::greater<>());
+  constexpr std::size_t kDiscs = 256;
+  constexpr double kMembers = 512.0;  // of a disc: enough to tell how much its samples become
+  const double read =
+      std::min(static_cast<double>(samples), std::pow(std::sqrt(kLeastSamples) + around, 2.0));
+  const std::vector<std::uint32_t> families = greatest_families(played);
+  const std::uint32_t greatest = *std::ranges::max_element(families);
+  if (greatest == 1) return read;
+  // The preview is thinned where a disc would hold more of it than that.
   const double each = std::max(1.0, static_cast<double>(samples) / static_cast<double>(families.size()));
-  double left = std::pow(std::sqrt(kLeastSamples) + around, 2.0);
-  double become = 0.0;
-  for (const std::uint32_t family : families) {
-    const double taken = std::min(left, each);
-    become += taken * family;
-    left -= taken;
-    if (left <= 0.0) break;
+  const auto stride = static_cast<std::size_t>(std::max(1.0, std::ceil(read / (each * kMembers))));
+  const double for_each = each * static_cast<double>(stride);
+  std::vector<std::uint32_t> kept;
+  std::vector<std::uint32_t> strong;
+  for (std::uint32_t a = 0; a < families.size(); ++a) {
+    if (a % stride == 0) kept.push_back(a);
+    if (2 * families[a] >= greatest) strong.push_back(a);
   }
-  return become;
+  const KdTree tree(played.rest, std::move(kept));
+  const auto members = static_cast<std::size_t>(std::ceil(read / for_each));
+  const std::size_t step = (strong.size() + kDiscs - 1) / kDiscs;
+  std::vector<Neighbor> disc;
+  double most = 0.0;
+  for (std::size_t i = 0; i < strong.size(); i += step) {
+    tree.nearest(played.rest[strong[i]], members, disc);
+    double left = read;
+    double become = 0.0;
+    for (const Neighbor& member : disc) {
+      const double taken = std::min(left, for_each);
+      become += taken * families[member.index];
+      left -= taken;
+    }
+    most = std::max(most, become + left);
+  }
+  return most;
 }
 
 }  // namespace
@@ -118,32 +142,33 @@ Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, s
   const double ring = kRingRoom * std::sqrt((static_cast<double>(neighbors) + 0.5) / std::numbers::pi);
   const double around = 2.0 * ring * static_cast<double>(rings_of(played));
   const double family = usual_family(played);
+  const double least = most_of_one_tile(played, samples, around);
   for (const std::size_t lanes : {kLanes, std::size_t{1}}) {
     const double room = samples_in(memory_bytes, lanes);
     const double widest = std::sqrt(room / family);  // that is read
     if ((widest - around) * kWidest < widest) continue;
-    // A tile where samples become most, all in one place, can be no smaller than that.
-    if (lanes > 1 && most_of_one_tile(played, samples, around) > room) continue;
+    if (least > room) continue;
     const double side = std::min(std::sqrt(room / kAround), std::sqrt(room) - around);
     return TilePlan{.most = static_cast<std::uint64_t>(std::max(kLeastSamples, side * side)),
                     .lanes = lanes,
                     .room = room,
                     .around = around};
   }
-  const double least =
-      std::min(static_cast<double>(samples), family * std::pow(std::sqrt(kLeastSamples) + around, 2.0));
   if (least <= samples_in(std::max(memory_bytes, kLeastMemory), 1))
     return TilePlan{.most = static_cast<std::uint64_t>(kLeastSamples),
                     .lanes = 1,
                     .room = samples_in(memory_bytes, 1),
                     .around = around};
   const double needed = least * static_cast<double>(bytes_each) / kShareOfTiles;
-  return Problem{.kind = ProblemKind::kOutOfSpace,
-                 .detail = "what a tile's samples depend on around it, by all edits of this recipe, takes " +
-                           std::to_string(static_cast<std::uint64_t>(needed) >> 20U) +
-                           " MiB of memory: give the job more, or make the recipe in parts",
-                 .limit = static_cast<double>(memory_bytes),
-                 .actual = std::ceil(needed)};
+  return Problem{
+      .kind = ProblemKind::kOutOfSpace,
+      .detail =
+          "the smallest tile, with what its samples depend on around it and what they become by this "
+          "recipe, takes " +
+          std::to_string(static_cast<std::uint64_t>(needed) >> 20U) +
+          " MiB of memory: give the job more, or make the recipe in parts",
+      .limit = static_cast<double>(memory_bytes),
+      .actual = std::ceil(needed)};
 }
 
 Points weighted_candidates(const Cloud& candidates, const PlayedSteps& played, const TilePlan& plan,

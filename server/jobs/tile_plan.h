@@ -30,7 +30,9 @@ struct TilePlan {
 /// no narrower than an eighth of what is read.
 /// `samples`: of the whole scan, as many as they become; `neighbors`: of a neighbourhood; `value_bytes`: of
 /// what a sample takes along besides, where samples are inserted
-/// Problem: out of space, where what an edit of one sample depends on takes more than the memory
+/// Problem: out of space, where the smallest tile takes more than the memory, with all that its samples
+/// depend on and where they become most (memory of less than 256 MiB counts as that)
+/// Cost:    256 searches among the preview's samples where samples are inserted
 Outcome<TilePlan> plan_tiles(const PlayedSteps& played, std::uint64_t samples, std::uint32_t neighbors,
                              std::uint64_t value_bytes, std::uint64_t memory_bytes);
 

@@ -10,6 +10,7 @@
 
 #include "engine/core/parallel.h"
 #include "engine/spatial/kd_tree.h"
+#include "server/jobs/tile_plan.h"
 #include "tests/server/job_folder.h"
 
 using namespace pointwright;
@@ -283,6 +284,42 @@ TEST_CASE("the samples that an edit may leave are those of the whole scan") {
   params.request.recipe.edits[1].edit.resampling->max_samples = static_cast<std::uint32_t>(count);
   CHECK(job.run(params).tiles_kept == 0);
   CHECK(bytes_of(job.out) == expected);
+}
+
+TEST_CASE("where samples become many in one place, tiles that memory does not hold are refused") {
+  constexpr std::size_t kSide = 200;
+  constexpr std::uint64_t kSamples = 100'000'000;
+  const auto planned = [](const auto& is_strong, std::uint64_t memory) {
+    PlayedSteps played;
+    played.rest = wavy_sheet(kSide).position;
+    played.script.bases.bands.resize(1);
+    PlayedSteps::Step step;
+    step.edits.resize(1);
+    step.edits.front().params.resampling = ResamplingParams{.sweeps = 4};
+    for (std::size_t i = 0; i < played.rest.size(); ++i)
+      step.families.push_back(is_strong(i / kSide, i % kSide) ? 64 : 1);
+    played.steps.push_back(step);
+    return plan_tiles(played, kSamples, 10, 0, memory);
+  };
+  const auto in_one_place = [](std::size_t row, std::size_t column) { return row < 20 && column < 20; };
+  const auto scattered = [](std::size_t row, std::size_t column) {
+    return row % 10 == 0 && column % 10 == 0;
+  };
+
+  constexpr std::uint64_t kMemory = std::uint64_t{512} << 20U;
+  CHECK(planned(scattered, kMemory).ok());
+  const auto refused = planned(in_one_place, kMemory);
+  REQUIRE_FALSE(refused.ok());
+  CHECK(refused.problem().kind == ProblemKind::kOutOfSpace);
+  REQUIRE(refused.problem().actual.has_value());
+  CHECK(*refused.problem().actual > static_cast<double>(kMemory));
+  // What the refusal asks for is enough, and no less is.
+  const auto asked = static_cast<std::uint64_t>(*refused.problem().actual);
+  const auto enough = planned(in_one_place, asked);
+  REQUIRE(enough.ok());
+  CHECK(enough.value().lanes == 1);
+  CHECK_FALSE(planned(in_one_place, asked - 10'000).ok());
+  CHECK(planned(in_one_place, 2 * asked).value().lanes == 2);
 }
 
 TEST_CASE("a file whose faces count its samples is resampled in memory, without them") {
